@@ -7,8 +7,8 @@ use crate::network::{Schedule, Training};
 use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 
-/// Largest bank.
-const MOST_SIMULATIONS: usize = 1_000_000_000_000;
+/// Most simulations of a bank.
+pub(super) const MOST_SIMULATIONS: usize = 1_000_000_000_000;
 
 /// Map from features to network inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -75,27 +75,23 @@ impl Settings {
         self.tuning.check()?;
         self.gate.check()?;
         self.refine.check()?;
-        let refuse =
-            |field: &str, value: f64, remedy: &str| Err(SettingError::new(field, value, remedy));
-        if self.bank_size < 100 {
-            let value = self.bank_size as f64;
-            return refuse("bank size", value, "train on at least 100 simulations");
-        }
-        if self.bank_size > MOST_SIMULATIONS {
-            let value = self.bank_size as f64;
-            return refuse("bank size", value, "at most 10¹² simulations are taken");
-        }
-        for (field, value) in [
+        let size = self.bank_size;
+        SettingError::unless(
+            size >= 100,
+            "bank size",
+            size,
+            "train on at least 100 simulations",
+        )?;
+        let remedy = "at most 10¹² simulations are taken";
+        SettingError::unless(size <= MOST_SIMULATIONS, "bank size", size, remedy)?;
+        for (field, count) in [
             ("cloud size", self.cloud.size),
             ("cloud per_parameter", self.cloud.per_parameter),
         ] {
-            if value < 10 {
-                return refuse(field, value as f64, "take at least 10 simulations");
-            }
+            SettingError::unless(count >= 10, field, count, "take at least 10 simulations")?;
         }
-        if !(self.cloud.spread > 0.0 && self.cloud.spread.is_finite()) {
-            return refuse("cloud spread", self.cloud.spread, "must be positive");
-        }
-        Ok(())
+        let spread = self.cloud.spread;
+        let valid = spread > 0.0 && spread.is_finite();
+        SettingError::unless(valid, "cloud spread", spread, "must be positive")
     }
 }

@@ -1,8 +1,7 @@
 //! Autoregressive coefficients.
 
-use super::regression::coefficients;
+use super::regression::RegressionMap;
 use super::{FeatureError, FeatureMap, FeatureRecipe};
-use crate::record::{Drive, Signal};
 use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -27,31 +26,15 @@ pub struct Ar {
 impl FeatureRecipe for Ar {
     fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
         if self.order == 0 {
-            return Err(FeatureError::Setting {
-                kind: "ar",
-                problem: "order = 0; an order is at least 1".into(),
-            });
+            let problem = "order = 0; an order is at least 1";
+            return Err(FeatureError::setting("ar", problem));
         }
-        Ok(Arc::new(Bound {
-            order: self.order,
+        Ok(Arc::new(RegressionMap {
+            p: self.order,
+            q: 0,
+            inputs: 0,
             outputs: twin.signals().outputs.len(),
         }))
-    }
-}
-
-struct Bound {
-    order: usize,
-    outputs: usize,
-}
-
-impl FeatureMap for Bound {
-    fn dim(&self) -> usize {
-        self.order * self.outputs
-    }
-
-    fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
-        let none = Signal::zeros((drive.samples(), 0));
-        coefficients(&none, outputs, self.order, 0)
     }
 }
 
@@ -59,6 +42,7 @@ impl FeatureMap for Bound {
 mod tests {
     use super::*;
     use crate::feature::testing::Tank;
+    use crate::record::{Drive, Signal};
 
     fn features(order: usize, y: &[f64]) -> Result<Vec<f64>, FeatureError> {
         let twin = Twin::new(Tank(0));

@@ -1,8 +1,7 @@
 //! Autoregressive coefficients with inputs.
 
-use super::regression::coefficients;
+use super::regression::RegressionMap;
 use super::{FeatureError, FeatureMap, FeatureRecipe};
-use crate::record::{Drive, Signal};
 use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -28,23 +27,20 @@ pub struct Arx {
 #[typetag::serde(name = "arx")]
 impl FeatureRecipe for Arx {
     fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
-        let setting = |problem: String| FeatureError::Setting {
-            kind: "arx",
-            problem,
-        };
         let Self {
             outputs: p,
             inputs: q,
         } = *self;
         if p == 0 || q == 0 {
             let problem = format!("outputs = {p}, inputs = {q}; both orders are at least 1");
-            return Err(setting(problem));
+            return Err(FeatureError::setting("arx", problem));
         }
         let signals = twin.signals();
         if signals.inputs.is_empty() {
-            return Err(setting("the twin has no input; take kind = \"ar\"".into()));
+            let problem = "the twin has no input; take kind = \"ar\"";
+            return Err(FeatureError::setting("arx", problem));
         }
-        Ok(Arc::new(Bound {
+        Ok(Arc::new(RegressionMap {
             p,
             q,
             inputs: signals.inputs.len(),
@@ -53,27 +49,10 @@ impl FeatureRecipe for Arx {
     }
 }
 
-struct Bound {
-    p: usize,
-    q: usize,
-    inputs: usize,
-    outputs: usize,
-}
-
-impl FeatureMap for Bound {
-    fn dim(&self) -> usize {
-        self.outputs * (self.p + self.q * self.inputs)
-    }
-
-    fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
-        coefficients(drive.inputs(), outputs, self.p, self.q)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Quantity;
+    use crate::record::{Drive, Quantity, Signal};
     use crate::twin::{Noise, Now, Outline, Parameter, ParameterSpace, StateSpace};
 
     /// Two inputs and two outputs: y₁ ← 0.7·y₁ + u₁ − 2·u₂, y₂ ← 0.2·y₂ + 3·u₁.

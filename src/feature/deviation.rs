@@ -1,6 +1,6 @@
 //! The output's deviation from a reference run, in block means.
 
-use super::{FeatureError, FeatureMap, FeatureRecipe};
+use super::{FeatureError, FeatureMap, FeatureRecipe, check_long, check_varies};
 use crate::record::{Drive, Signal};
 use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
@@ -27,12 +27,10 @@ pub struct Deviation {
 impl FeatureRecipe for Deviation {
     fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
         if self.blocks == 0 {
-            return Err(FeatureError::Setting {
-                kind: "deviation",
-                problem: "blocks = 0; at least 1 is needed".into(),
-            });
+            let problem = "blocks = 0; at least 1 is needed";
+            return Err(FeatureError::setting("deviation", problem));
         }
-        Ok(Arc::new(Bound {
+        Ok(Arc::new(DeviationMap {
             blocks: self.blocks,
             outputs: twin.signals().outputs.len(),
             centre: twin.parameters().centre(),
@@ -42,7 +40,7 @@ impl FeatureRecipe for Deviation {
     }
 }
 
-struct Bound {
+struct DeviationMap {
     blocks: usize,
     outputs: usize,
     centre: Vec<f64>,
@@ -51,38 +49,29 @@ struct Bound {
     last: Mutex<Option<(Drive, Arc<Signal>)>>,
 }
 
-impl Bound {
+impl DeviationMap {
     /// ŷ under `drive`.
     fn reference(&self, drive: &Drive) -> Result<Arc<Signal>, FeatureError> {
         // A thread that panicked in here has left nothing half-done.
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((known, run)) = last.as_ref()
-            && known == drive
-        {
+        let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, run)) = last().as_ref().filter(|(known, _)| known == drive) {
             return Ok(run.clone());
         }
-        drop(last);
         let run = Arc::new(self.twin.free_run(&self.centre, drive)?);
-        last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        *last = Some((drive.clone(), run.clone()));
+        *last() = Some((drive.clone(), run.clone()));
         Ok(run)
     }
 }
 
-impl FeatureMap for Bound {
+impl FeatureMap for DeviationMap {
     fn dim(&self) -> usize {
         self.blocks * self.outputs
     }
 
     fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
         let samples = drive.samples();
-        if samples < self.blocks {
-            return Err(FeatureError::TooShort {
-                samples,
-                needed: self.blocks,
-            });
-        }
-        super::check_varies(outputs)?;
+        check_long(samples, self.blocks)?;
+        check_varies(outputs)?;
         let deviation = outputs - self.reference(drive)?.as_ref();
         let edge = |b: usize| b * samples / self.blocks;
         let mut features = Vec::with_capacity(self.dim());

@@ -167,15 +167,28 @@ pub enum FeatureError {
     Reference(#[from] SimulationError),
 }
 
+impl FeatureError {
+    /// Creates an error for the settings of recipe `kind`.
+    fn setting(kind: &'static str, problem: impl Into<String>) -> Self {
+        let problem = problem.into();
+        Self::Setting { kind, problem }
+    }
+}
+
+/// Refuses a record of fewer samples than are needed.
+fn check_long(samples: usize, needed: usize) -> Result<(), FeatureError> {
+    match samples < needed {
+        true => Err(FeatureError::TooShort { samples, needed }),
+        false => Ok(()),
+    }
+}
+
 /// Refuses an output that never changes.
 fn check_varies(outputs: &Signal) -> Result<(), FeatureError> {
-    for (j, column) in outputs.columns().into_iter().enumerate() {
+    for (column, channel) in outputs.columns().into_iter().zip(1..) {
         let value = column[0];
         if column.iter().all(|v| *v == value) {
-            return Err(FeatureError::Constant {
-                channel: j + 1,
-                value,
-            });
+            return Err(FeatureError::Constant { channel, value });
         }
     }
     Ok(())

@@ -1,45 +1,45 @@
 //! Least squares of a signal on its own past and that of other signals.
 
-use super::{FeatureError, check_varies};
+use super::{FeatureError, FeatureMap, check_long, check_varies};
 use crate::math::{Fit, Lagged, LaggedSignals, LeastSquares, MathError, one_column};
-use crate::record::Signal;
+use crate::record::{Drive, Signal};
 
-/// Coefficients of each output on its own last `p` values and the last `q` of each input:
+/// Coefficients of each output on its own last p values and the last q of each input:
 ///
 /// ```text
 /// y(t) = Σᵢ aᵢ·y(t − i) + Σⱼ Σᵢ bⱼᵢ·uⱼ(t − i) + e(t),   t = max(p, q) … N − 1
 /// ```
 ///
 /// in the order a₁ … a_p, b₁₁ … b₁_q, b₂₁ …, output after output.
-pub(super) fn coefficients(
-    inputs: &Signal,
-    outputs: &Signal,
-    p: usize,
-    q: usize,
-) -> Result<Vec<f64>, FeatureError> {
-    // As many equations as unknowns; a file may ask for any order.
-    let unknowns = p.saturating_add(q.saturating_mul(inputs.ncols()));
-    let (samples, needed) = (outputs.nrows(), p.max(q).saturating_add(unknowns));
-    if samples < needed {
-        return Err(FeatureError::TooShort { samples, needed });
+pub(super) struct RegressionMap {
+    pub p: usize,
+    pub q: usize,
+    /// Inputs that enter; none where q = 0.
+    pub inputs: usize,
+    pub outputs: usize,
+}
+
+impl FeatureMap for RegressionMap {
+    fn dim(&self) -> usize {
+        self.outputs * (self.p + self.q * self.inputs)
     }
-    check_varies(outputs)?;
-    let inputs: Vec<Lagged> = (inputs.columns().into_iter())
-        .map(|u| Lagged {
-            values: u.to_vec(),
-            lags: q,
-        })
-        .collect();
-    let mut all = Vec::new();
-    for y in outputs.columns() {
-        let mut signals = vec![Lagged {
-            values: y.to_vec(),
-            lags: p,
-        }];
-        signals.extend(inputs.iter().cloned());
-        all.extend_from_slice(regress(signals, p.max(q))?.coefficients.as_slice());
+
+    fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
+        // As many equations as unknowns; a file may ask for any order.
+        let start = self.p.max(self.q);
+        let unknowns = (self.q.saturating_mul(self.inputs)).saturating_add(self.p);
+        check_long(outputs.nrows(), start.saturating_add(unknowns))?;
+        check_varies(outputs)?;
+        let inputs = drive.inputs().columns().into_iter().take(self.inputs);
+        let inputs: Vec<Lagged> = inputs.map(|u| Lagged::new(u.to_vec(), self.q)).collect();
+        let mut all = Vec::new();
+        for y in outputs.columns() {
+            let mut signals = vec![Lagged::new(y.to_vec(), self.p)];
+            signals.extend(inputs.iter().cloned());
+            all.extend_from_slice(regress(signals, start)?.coefficients.as_slice());
+        }
+        Ok(all)
     }
-    Ok(all)
 }
 
 /// Regresses the first signal on the lags of all, from sample `start` on.
@@ -64,7 +64,14 @@ mod tests {
             y[k] = 0.9 * y[k - 1] + 0.5 * u[k - 1];
         }
         let signal = |v: &[f64]| Signal::from_shape_vec((v.len(), 1), v.to_vec()).unwrap();
-        let found = coefficients(&signal(&u), &signal(&y), 1, 30).unwrap();
+        let map = RegressionMap {
+            p: 1,
+            q: 30,
+            inputs: 1,
+            outputs: 1,
+        };
+        let drive = Drive::new(1.0, signal(&u)).unwrap();
+        let found = map.extract(&drive, &signal(&y)).unwrap();
         assert!((found[0] - 0.9).abs() < 1e-6, "{}", found[0]);
         let gain: f64 = found[1..].iter().sum();
         assert!((gain - 0.5).abs() < 1e-5, "{gain}");

@@ -1,6 +1,6 @@
 //! The gradient of a Kalman filter's likelihood as features.
 
-use super::{FeatureError, FeatureMap, FeatureRecipe};
+use super::{FeatureError, FeatureMap, FeatureRecipe, check_long, check_varies};
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score as Gradient};
 use crate::math::LANES;
 use crate::record::{Drive, Record, Signal};
@@ -33,15 +33,12 @@ pub struct Score {
 impl FeatureRecipe for Score {
     fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
         let Twin::Equations(equations) = twin else {
-            return Err(FeatureError::Setting {
-                kind: "score",
-                problem:
-                    "a black-box twin shows no equations to filter with; take ar, arx or armax"
-                        .into(),
-            });
+            let problem =
+                "a black-box twin shows no equations to filter with; take ar, arx or armax";
+            return Err(FeatureError::setting("score", problem));
         };
         let space = twin.parameters();
-        Ok(Arc::new(Bound {
+        Ok(Arc::new(ScoreMap {
             reference: space.centre(),
             coordinates: Coordinates::new(&space),
             filter: self.filter.clone(),
@@ -53,7 +50,7 @@ impl FeatureRecipe for Score {
 
 /// Score features at one reference.
 #[derive(Clone)]
-struct Bound {
+struct ScoreMap {
     equations: Arc<dyn StateSpace>,
     space: ParameterSpace,
     coordinates: Coordinates,
@@ -61,13 +58,10 @@ struct Bound {
     reference: Vec<f64>,
 }
 
-impl Bound {
+impl ScoreMap {
     fn record(&self, drive: &Drive, outputs: &Signal) -> Result<Record, FeatureError> {
-        let (samples, needed) = (outputs.nrows(), 2 * self.dim() + 4);
-        if samples < needed {
-            return Err(FeatureError::TooShort { samples, needed });
-        }
-        super::check_varies(outputs)?;
+        check_long(outputs.nrows(), 2 * self.dim() + 4)?;
+        check_varies(outputs)?;
         Record::new(drive.clone(), outputs.clone())
             .map_err(|error| FeatureError::Filter(error.into()))
     }
@@ -84,7 +78,7 @@ impl Bound {
     }
 }
 
-impl FeatureMap for Bound {
+impl FeatureMap for ScoreMap {
     fn dim(&self) -> usize {
         2 * self.space.len() + 1
     }

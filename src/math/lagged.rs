@@ -13,6 +13,13 @@ pub struct Lagged {
     pub lags: usize,
 }
 
+impl Lagged {
+    /// A signal with this many lags.
+    pub fn new(values: Vec<f64>, lags: usize) -> Self {
+        Self { values, lags }
+    }
+}
+
 /// The matrix Φ whose columns are lags of signals, never written out:
 ///
 /// ```text

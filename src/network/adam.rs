@@ -10,6 +10,9 @@ use dfdx::prelude::{Cpu, Gradients, HasShape, Shape, Tensor};
 const BETA1: f32 = 0.9;
 const BETA2: f32 = 0.999;
 const EPSILON: f32 = 1e-8;
+/// Gradients, weights and first moments below this count as zero, second moments below its square: far below [`EPSILON`] they move
+/// nothing, and as subnormal numbers, where dead units decay, they would cost most of the training's time.
+const NOTHING: f32 = 1e-17;
 
 /// Adam (Kingma & Ba 2015) with plain L2 weight decay, as PyTorch's `Adam`.
 ///
@@ -118,15 +121,25 @@ impl TensorVisitor<f32, Cpu> for Step<'_> {
             .zip(moments.first.iter_mut().zip(&mut moments.second));
         widest(|| {
             for ((g, w), (m, v)) in each {
-                let slope = *g + decay * w;
-                *m = BETA1 * *m + (1.0 - BETA1) * slope;
-                *v = BETA2 * *v + (1.0 - BETA2) * slope * slope;
+                let slope = kept(*g + decay * w, NOTHING);
+                *m = kept(BETA1 * *m + (1.0 - BETA1) * slope, NOTHING);
+                *v = kept(
+                    BETA2 * *v + (1.0 - BETA2) * slope * slope,
+                    NOTHING * NOTHING,
+                );
                 *g = w - rate * *m / ((*v * unbias_second).sqrt() + EPSILON);
+                *g = kept(*g, NOTHING);
             }
         });
         tensor.copy_from(gradient);
         Ok(None)
     }
+}
+
+/// The value, or zero below `least`; NaN stays.
+#[inline(always)]
+fn kept(value: f32, least: f32) -> f32 {
+    if value.abs() < least { 0.0 } else { value }
 }
 
 #[cfg(test)]
@@ -175,5 +188,22 @@ mod tests {
             adam.step(1e-3, &mut none).update(&mut module).unwrap();
         }
         assert!(norm(&module) < before);
+    }
+
+    /// Without gradient, weight decay alone takes weights and moments to zero: no number stays subnormal.
+    #[test]
+    fn nothing_decays_into_subnormal_numbers() {
+        let mut module = Cpu::default().build_module::<Linear<8, 8>, f32>();
+        let mut adam = Adam::new(1e-5);
+        for _ in 0..3000 {
+            let mut none = Gradients::leaky();
+            adam.step(1e-3, &mut none).update(&mut module).unwrap();
+        }
+        let moments = adam
+            .moments
+            .iter()
+            .flat_map(|m| m.first.iter().chain(&m.second));
+        let weights = module.weight.as_vec();
+        assert!(!moments.chain(&weights).any(|v| v.is_subnormal()));
     }
 }

@@ -1,8 +1,7 @@
 //! A training that is interrupted goes on where it was, to the same bits.
 
 use super::adam::{Adam, Moments};
-use super::{History, NamedTensor, NetworkError};
-use super::{bytes_of, values_of};
+use super::{History, NamedTensor, NetworkError, bytes_of, values_of};
 use crate::storage::files::{replace, sha256, with_remedy};
 use crate::storage::untrusted::read_kept;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -54,7 +53,14 @@ pub(super) struct Position {
     pub best: Option<(f64, usize)>,
 }
 
-/// All that the rest of a training depends on.
+impl Position {
+    /// The beginning of the next epoch.
+    pub(super) fn next_epoch(&mut self) {
+        (self.epoch, self.block, self.total) = (self.epoch + 1, 0, 0.0);
+    }
+}
+
+/// All that the rest of a training depends on, as it is kept.
 pub(super) struct State {
     pub position: Position,
     pub weights: Vec<NamedTensor>,

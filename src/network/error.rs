@@ -77,45 +77,13 @@ pub enum NetworkError {
         /// The learning rate in that epoch.
         learning_rate: f64,
     },
-    /// A stored network lacks a tensor of the architecture.
-    #[error("tensor `{name}` of shape {expected:?} is missing; was it stored by `{architecture}`?")]
-    MissingTensor {
+    /// A stored tensor is missing, surplus, misshapen or damaged.
+    #[error("tensor `{name}` {problem}")]
+    Tensor {
         /// Name of the tensor.
         name: String,
-        /// Its shape in the architecture.
-        expected: Vec<usize>,
-        /// The architecture that was asked to restore.
-        architecture: &'static str,
-    },
-    /// A stored network holds a tensor that the architecture has not.
-    #[error(
-        "tensor `{name}` of shape {found:?} has no place in `{architecture}`; was it stored by another architecture?"
-    )]
-    SurplusTensor {
-        /// Name of the tensor.
-        name: String,
-        /// Its stored shape.
-        found: Vec<usize>,
-        /// The architecture that was asked to restore.
-        architecture: &'static str,
-    },
-    /// A stored tensor has another shape than in the architecture.
-    #[error("tensor `{name}`: expected shape {expected:?}, found {found:?} with {values} values")]
-    MisshapenTensor {
-        /// Name of the tensor.
-        name: String,
-        /// Its shape in the architecture.
-        expected: Vec<usize>,
-        /// Its stored shape.
-        found: Vec<usize>,
-        /// Number of stored values.
-        values: usize,
-    },
-    /// A stored tensor holds NaN or infinity.
-    #[error("tensor `{name}` holds a value that is not finite; the file is damaged")]
-    DamagedTensor {
-        /// Name of the tensor.
-        name: String,
+        /// Problem and remedy.
+        problem: String,
     },
     /// The tensor library failed: in practice, out of memory.
     #[error("tensor operation failed: {0}")]
@@ -128,5 +96,12 @@ pub enum NetworkError {
 impl From<dfdx::tensor::CpuError> for NetworkError {
     fn from(error: dfdx::tensor::CpuError) -> Self {
         Self::Backend(error.to_string())
+    }
+}
+
+impl NetworkError {
+    pub(super) fn tensor(name: &str, problem: String) -> Self {
+        let name = name.to_owned();
+        Self::Tensor { name, problem }
     }
 }

@@ -1,10 +1,12 @@
 //! The loss: a weighted Huber error of the heads, and the penalty that keeps their first layers apart.
 
-use super::fused::{Existing, Matrix, kernel, multiply, numbers};
+use super::fused::{add, numbers, view, view_mut};
 use super::{FirstWeight, NetworkError, TapedBatch};
 use dfdx::prelude::{
     Const, ConstDim, Cpu, Merge, OwnedTape, PutTape, Rank0, SplitTape, Tape, Tensor, TensorFromVec,
 };
+use ndarray::linalg::general_mat_mul;
+use ndarray::{Array2, ArrayView2, Axis, s};
 
 /// A loss that can run backwards.
 type TapedLoss = Tensor<Rank0, f32, Cpu, OwnedTape<f32, Cpu>>;
@@ -21,9 +23,9 @@ pub(super) struct Loss {
 }
 
 impl Loss {
-    /// Mean over rows of the weighted Huber errors, from row-major predictions and targets.
-    pub(super) fn error(&self, predictions: &[f32], targets: &[f32]) -> f64 {
-        let rows = targets.len() / self.weights.len();
+    /// Mean over rows of the weighted Huber errors, of predictions and targets of the same shape.
+    pub(super) fn error(&self, predictions: &Array2<f32>, targets: &Array2<f32>) -> f64 {
+        let rows = targets.nrows();
         let weights = self.weights.iter().cycle();
         let each = predictions.iter().zip(targets).zip(weights);
         let total: f64 = each
@@ -34,7 +36,7 @@ impl Loss {
 
     /// The mean error of a batch, and the loss whose backward pass reaches all that made the predictions.
     ///
-    /// `predictions` holds one column for each head, `targets` is rows × heads. The penalty adds its gradient to the
+    /// `predictions` holds one column for each head, `targets` is rows × heads, row-major. The penalty adds its gradient to the
     /// heads' first weights; its value is not part of what is returned.
     pub(super) fn taped<K: ConstDim, H: FirstWeight<K>>(
         &self,
@@ -65,7 +67,7 @@ impl Loss {
         }
         tape.add_backward_op(move |gradients| {
             for (prediction, slope) in &slopes {
-                kernel::add(gradients.get_or_alloc_mut(prediction)?, slope);
+                add(gradients.get_or_alloc_mut(prediction)?, slope);
             }
             Ok(())
         });
@@ -81,16 +83,19 @@ impl Loss {
         tape: &mut OwnedTape<f32, Cpu>,
         heads: &[H],
     ) {
-        let mut stacked = Vec::with_capacity(heads.len() * H::Rows::SIZE * K::SIZE);
-        for head in heads {
-            stacked.extend(numbers(head.first_weight()));
-        }
+        let stacked: Vec<f32> = (heads.iter().map(FirstWeight::first_weight))
+            .flat_map(numbers)
+            .collect();
         let ids: Vec<_> = heads.iter().map(|h| h.first_weight().ghost()).collect();
         let lambda = self.orthogonality;
         tape.add_backward_op(move |gradients| {
-            let penalty = Orthogonality::new(&stacked, ids.len(), K::SIZE);
-            for (j, weight) in ids.iter().enumerate() {
-                penalty.add_gradient(lambda, j, gradients.get_or_alloc_mut(weight)?);
+            let slope = penalty_gradient(view(&stacked, K::SIZE), ids.len(), lambda);
+            for (weight, slope) in ids
+                .iter()
+                .zip(slope.axis_chunks_iter(Axis(0), H::Rows::SIZE))
+            {
+                let mut gradient = view_mut(gradients.get_or_alloc_mut(weight)?, K::SIZE);
+                gradient += &slope;
             }
             Ok(())
         });
@@ -110,87 +115,30 @@ fn huber(residual: f32, delta: f32) -> (f32, f32) {
     }
 }
 
-/// Σ_{j<k} ‖U_j U_kᵀ‖_F² of d weights U (q × p each), stacked in one matrix.
+/// Gradient of λ Σ_{j<k} ‖U_j U_kᵀ‖_F² with respect to d weights U (q × p each), stacked as they are.
 ///
-/// The gradient with respect to U_j is 2 Σ_{k≠j} (U_j U_kᵀ) U_k. Only the blocks j < k of the Gram matrix are computed,
-/// each head against all later ones in one product; this takes 6·d(d−1)/2·q²p operations, the least for few heads.
-struct Orthogonality<'a> {
-    stacked: &'a [f32],
-    /// d·q × d·q; blocks on and below the diagonal stay zero.
-    gram: Vec<f32>,
-    heads: usize,
-    rows: usize,
-    cols: usize,
-}
-
-impl<'a> Orthogonality<'a> {
-    fn new(stacked: &'a [f32], heads: usize, cols: usize) -> Self {
-        let size = stacked.len() / cols;
-        let mut this = Self {
-            stacked,
-            gram: vec![0.0; size * size],
-            heads,
-            rows: size / heads,
-            cols,
-        };
-        let mut gram = std::mem::take(&mut this.gram);
-        for j in 0..heads - 1 {
-            let right = (j + 1) * this.rows;
-            let product = &mut gram[j * this.rows * size + right..];
-            let (own, later) = (this.weights(j, j + 1), this.weights(j + 1, heads));
-            multiply(
-                1.0,
-                own,
-                later.transposed(),
-                Existing::Replace,
-                product,
-                size,
-            );
-        }
-        this.gram = gram;
-        this
-    }
-
-    /// U_from … U_(to−1), one below the other.
-    fn weights(&self, from: usize, to: usize) -> Matrix<'a> {
-        let each = self.rows * self.cols;
-        let block = &self.stacked[from * each..to * each];
-        Matrix::new(block, (to - from) * self.rows, self.cols, self.cols)
-    }
-
-    /// Adds `lambda` times the gradient with respect to U_j.
-    fn add_gradient(&self, lambda: f32, j: usize, gradient: &mut [f32]) {
-        let (rows, size) = (self.rows, self.rows * self.heads);
-        let mut add = |block: Matrix, others: Matrix| {
-            multiply(
-                2.0 * lambda,
-                block,
-                others,
-                Existing::Add,
-                gradient,
-                self.cols,
-            );
-        };
-        if j + 1 < self.heads {
-            let right = (j + 1) * rows;
-            let block = Matrix::new(
-                &self.gram[j * rows * size + right..],
-                rows,
-                size - right,
-                size,
-            );
-            add(block, self.weights(j + 1, self.heads));
+/// That with respect to U_j is 2λ Σ_{k≠j} (U_j U_kᵀ) U_k. Only the blocks j < k of the Gram matrix are computed, each weight against all
+/// later ones in one product: 6·d(d−1)/2·q²p operations, the least for few heads.
+fn penalty_gradient(stacked: ArrayView2<'_, f32>, heads: usize, lambda: f32) -> Array2<f32> {
+    let (size, rows) = (stacked.nrows(), stacked.nrows() / heads);
+    let mut gram = Array2::zeros((size, size));
+    let mut gradient = Array2::zeros(stacked.dim());
+    for j in 0..heads {
+        let (start, end) = (j * rows, (j + 1) * rows);
+        let own = stacked.slice(s![start..end, ..]);
+        let mut slope = gradient.slice_mut(s![start..end, ..]);
+        if j + 1 < heads {
+            let later = stacked.slice(s![end.., ..]);
+            let mut block = gram.slice_mut(s![start..end, end..]);
+            general_mat_mul(1.0, &own, &later.t(), 0.0, &mut block);
+            general_mat_mul(2.0 * lambda, &block, &later, 1.0, &mut slope);
         }
         if j > 0 {
-            let block = Matrix::new(&self.gram[j * rows..], j * rows, rows, size);
-            add(block.transposed(), self.weights(0, j));
+            let (earlier, block) = (s![..start, ..], gram.slice(s![..start, start..end]));
+            general_mat_mul(2.0 * lambda, &block.t(), &stacked.slice(earlier), 1.0, &mut slope);
         }
     }
-
-    #[cfg(test)]
-    fn value(&self) -> f64 {
-        self.gram.iter().map(|g| f64::from(*g).powi(2)).sum()
-    }
+    gradient
 }
 
 #[cfg(test)]
@@ -215,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn the_penalty_has_its_definition_and_its_gradient() {
+    fn the_penalty_has_the_gradient_of_its_definition() {
         for (heads, rows, cols) in [(2, 3, 4), (3, 2, 5), (4, 3, 3)] {
             let u = weights(heads, rows, cols);
             let each = rows * cols;
@@ -236,18 +184,13 @@ mod tests {
                 }
                 total
             };
-            let penalty = Orthogonality::new(&u, heads, cols);
-            assert!((penalty.value() - value(&u)).abs() < 1e-5 * value(&u));
-            for j in 0..heads {
-                let mut gradient = vec![0.0; each];
-                penalty.add_gradient(0.5, j, &mut gradient);
-                for (i, g) in gradient.iter().enumerate() {
-                    let (mut up, mut down) = (u.clone(), u.clone());
-                    up[j * each + i] += 0.01;
-                    down[j * each + i] -= 0.01;
-                    let measured = 0.5 * (value(&up) - value(&down)) / 0.02;
-                    assert!((f64::from(*g) - measured).abs() < 1e-4, "{g} {measured}");
-                }
+            let gradient = penalty_gradient(view(&u, cols), heads, 0.5);
+            for (i, g) in gradient.iter().enumerate() {
+                let (mut up, mut down) = (u.clone(), u.clone());
+                up[i] += 0.01;
+                down[i] -= 0.01;
+                let measured = 0.5 * (value(&up) - value(&down)) / 0.02;
+                assert!((f64::from(*g) - measured).abs() < 1e-4, "{g} {measured}");
             }
         }
     }

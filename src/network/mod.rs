@@ -34,18 +34,12 @@
 mod adam;
 mod architectures;
 mod checkpoints;
+mod data;
 mod error;
-mod face;
-mod feed;
-mod first_weight;
 mod fused;
-mod layer;
 mod loss;
 mod model;
 mod multi_head;
-mod rows;
-mod samples;
-mod seed;
 mod settings;
 mod tensors;
 #[cfg(test)]
@@ -54,18 +48,16 @@ mod train;
 
 pub use architectures::{Compact, Deep};
 pub(crate) use checkpoints::Checkpoints;
+pub(crate) use data::{Part, Samples};
 pub use error::NetworkError;
-pub(crate) use face::{Architecture, Network};
-use first_weight::FirstWeight;
 pub(crate) use fused::{BuiltDense, BuiltNormDense};
 pub use fused::{Dense, Leaky, NormDense};
-pub(crate) use multi_head::architecture;
-pub(crate) use samples::{Part, Samples};
+pub(crate) use multi_head::{Architecture, Network, architecture};
 pub use settings::{History, Schedule, Training};
 pub(crate) use tensors::{NamedTensor, bytes_of, values_of};
 
 use dfdx::prelude::{BuildOnDevice, Const, ConstDim, Cpu, NoneTape, OwnedTape, Tensor};
-use layer::Layers;
+use model::{FirstWeight, Layers};
 
 /// Layers of an architecture; `use truetwin::network::layers::*` needs no dfdx of your own.
 ///
@@ -80,8 +72,7 @@ pub mod layers {
 #[doc(hidden)]
 pub mod untyped {
     pub use super::checkpoints::Checkpoints;
-    pub use super::face::{Architecture, Network};
-    pub use super::multi_head::architecture;
+    pub use super::multi_head::{Architecture, Network, architecture};
 }
 
 /// A batch of rows of width `C`.

@@ -1,17 +1,92 @@
 //! A trunk and its heads on a device.
 
-use super::rows::Rows;
+use super::data::gathered;
 use super::{
-    Batch, FirstWeight, HeadArchitecture, Layers, NamedTensor, NetworkError, TapedBatch, tensors,
+    Batch, BuiltDense, BuiltNormDense, HeadArchitecture, NamedTensor, NetworkError, TapedBatch,
+    tensors,
 };
+use dfdx::nn::modules::Linear;
 use dfdx::prelude::{
-    BuildOnDevice, Const, ConstDim, Cpu, HasShape, NoneTape, OwnedTape, TensorFromVec, Trace,
+    BuildOnDevice, Const, ConstDim, Cpu, CpuError, Module, ModuleMut, NoneTape, OwnedTape, Tensor,
+    TensorCollection, TensorFromVec, Trace,
 };
+use ndarray::{Array2, ArrayView2, Axis};
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 
 /// Rows that are evaluated at a time: enough for fast products, few enough to stay in the cache.
 const CHUNK: usize = 256;
+
+/// Layers on a device that map rows of width `I` to rows of width `O`, with and without a tape.
+///
+/// Implemented for all that qualifies: dfdx layers, fused layers and tuples of them.
+pub trait Layers<I: ConstDim, O: ConstDim>:
+    TensorCollection<f32, Cpu, To<f32, Cpu> = Self>
+    + Clone
+    + Send
+    + Sync
+    + Module<Batch<I>, Output = Batch<O>, Error = CpuError>
+    + ModuleMut<TapedBatch<I>, Output = TapedBatch<O>, Error = CpuError>
+    + 'static
+{
+}
+
+impl<I: ConstDim, O: ConstDim, T> Layers<I, O> for T where
+    T: TensorCollection<f32, Cpu, To<f32, Cpu> = T>
+        + Clone
+        + Send
+        + Sync
+        + Module<Batch<I>, Output = Batch<O>, Error = CpuError>
+        + ModuleMut<TapedBatch<I>, Output = TapedBatch<O>, Error = CpuError>
+        + 'static
+{
+}
+
+/// Layers whose first one multiplies rows of width `I` by a weight, which the orthogonality penalty compares between heads.
+///
+/// Implemented for dfdx's `Linear`, [`Dense`](super::Dense), [`NormDense`](super::NormDense), and tuples, nested too,
+/// that begin with one of them.
+pub trait FirstWeight<I: ConstDim> {
+    /// Rows of the weight: outputs of the first layer.
+    type Rows: ConstDim;
+
+    /// The weight, rows × I.
+    fn first_weight(&self) -> &Tensor<(Self::Rows, I), f32, Cpu>;
+}
+
+macro_rules! weight_of_layer {
+    ($layer:ty $(, $activation:ident)?) => {
+        impl<const I: usize, const O: usize $(, $activation)?> FirstWeight<Const<I>> for $layer {
+            type Rows = Const<O>;
+
+            fn first_weight(&self) -> &Tensor<(Const<O>, Const<I>), f32, Cpu> {
+                &self.weight
+            }
+        }
+    };
+}
+weight_of_layer!(Linear<I, O, f32, Cpu>);
+weight_of_layer!(BuiltDense<I, O, A, f32, Cpu>, A);
+weight_of_layer!(BuiltNormDense<I, O, A, f32, Cpu>, A);
+
+macro_rules! weight_of_tuple {
+    ($($rest:ident),*) => {
+        impl<I: ConstDim, First: FirstWeight<I>, $($rest),*> FirstWeight<I> for (First, $($rest,)*) {
+            type Rows = First::Rows;
+
+            fn first_weight(&self) -> &Tensor<(Self::Rows, I), f32, Cpu> {
+                self.0.first_weight()
+            }
+        }
+    };
+}
+// As long as dfdx's own tuples.
+weight_of_tuple!();
+weight_of_tuple!(B);
+weight_of_tuple!(B, C);
+weight_of_tuple!(B, C, D);
+weight_of_tuple!(B, C, D, E);
+weight_of_tuple!(B, C, D, E, F);
 
 /// Layers from `I` features to `K` hidden values, and one head for each output. With the trunk `()`, heads alone.
 pub(super) struct Model<I, K, T, H> {
@@ -52,12 +127,12 @@ pub(super) fn build<A: HeadArchitecture>(
 ) -> Result<ModelOf<A>, NetworkError> {
     let device = Cpu::seed_from_u64(seed);
     let mut trunk = A::Trunk::try_build_on_device(&device)?;
-    tensors::widen_first_layer(&mut trunk, inputs, A::Features::SIZE);
-    tensors::set_dropout(&mut trunk, A::DROPOUT);
+    tensors::widen_first_layer(&mut trunk, inputs, A::Features::SIZE)?;
+    tensors::set_dropout(&mut trunk, A::DROPOUT)?;
     let mut heads = Vec::with_capacity(outputs);
     for _ in 0..outputs {
         let mut head = A::Head::try_build_on_device(&device)?;
-        tensors::set_dropout(&mut head, A::DROPOUT);
+        tensors::set_dropout(&mut head, A::DROPOUT)?;
         heads.push(head);
     }
     Ok(Model::new(trunk, heads))
@@ -70,14 +145,15 @@ where
     T: Layers<I, K>,
     H: Layers<K, Const<1>> + FirstWeight<K>,
 {
-    /// One taped prediction for each head. Dropout draws from `device`, which every operation passes on.
+    /// One taped prediction for each head, of the rows with these indices. Dropout draws from `device`, which every operation passes on.
     pub(super) fn forward_taped(
         &mut self,
-        features: Vec<f32>,
+        features: &Array2<f32>,
+        batch: &[usize],
         device: &Cpu,
     ) -> Result<Vec<TapedBatch<Const<1>>>, NetworkError> {
-        let rows = features.len() / I::SIZE;
-        let x: Batch<I> = device.try_tensor_from_vec(features, (rows, I::default()))?;
+        let shape = (batch.len(), I::default());
+        let x: Batch<I> = device.try_tensor_from_vec(gathered(features, batch), shape)?;
         let hidden = self.trunk.try_forward_mut(x.leaky_traced())?;
         let bare: Batch<K> = hidden.retaped::<NoneTape>();
         let mut hidden = Some(hidden);
@@ -94,45 +170,35 @@ where
     }
 
     /// The trunk's outputs.
-    pub(super) fn hidden(&self, features: &Rows) -> Result<Rows, NetworkError> {
-        let mut hidden = Vec::with_capacity(features.len() * K::SIZE);
-        self.each_chunk(features, |chunk| {
-            hidden.extend(chunk.as_vec());
-            Ok(())
-        })?;
-        Ok(Rows::new(K::SIZE, hidden))
+    pub(super) fn hidden(&self, features: &Array2<f32>) -> Result<Array2<f32>, NetworkError> {
+        let mut hidden = Array2::zeros((features.nrows(), K::SIZE));
+        for (chunk, mut place) in chunks(features).zip(hidden.axis_chunks_iter_mut(Axis(0), CHUNK))
+        {
+            let values = self.through_trunk(chunk)?.as_vec();
+            place.iter_mut().zip(values).for_each(|(to, v)| *to = v);
+        }
+        Ok(hidden)
     }
 
     /// The heads' outputs.
-    pub(super) fn predict(&self, features: &Rows) -> Result<Rows, NetworkError> {
-        let outputs = self.heads.len();
-        let mut predictions = Vec::with_capacity(features.len() * outputs);
-        self.each_chunk(features, |chunk| {
-            let start = predictions.len();
-            predictions.resize(start + chunk.shape().0 * outputs, 0.0);
-            for (j, head) in self.heads.iter().enumerate() {
-                let places = predictions[start + j..].iter_mut().step_by(outputs);
-                for (place, value) in places.zip(head.try_forward(chunk.clone())?.as_vec()) {
-                    *place = value;
-                }
+    pub(super) fn predict(&self, features: &Array2<f32>) -> Result<Array2<f32>, NetworkError> {
+        let mut predictions = Array2::zeros((features.nrows(), self.heads.len()));
+        let places = predictions.axis_chunks_iter_mut(Axis(0), CHUNK);
+        for (chunk, mut place) in chunks(features).zip(places) {
+            let hidden = self.through_trunk(chunk)?;
+            for (head, mut column) in self.heads.iter().zip(place.columns_mut()) {
+                let values = head.try_forward(hidden.clone())?.as_vec();
+                column.iter_mut().zip(values).for_each(|(to, v)| *to = v);
             }
-            Ok(())
-        })?;
-        Ok(Rows::new(outputs, predictions))
+        }
+        Ok(predictions)
     }
 
-    fn each_chunk(
-        &self,
-        features: &Rows,
-        mut take: impl FnMut(Batch<K>) -> Result<(), NetworkError>,
-    ) -> Result<(), NetworkError> {
-        let device = Cpu::default();
-        for chunk in features.chunks(CHUNK) {
-            let shape = (chunk.len() / I::SIZE, I::default());
-            let x: Batch<I> = device.try_tensor_from_vec(chunk.to_vec(), shape)?;
-            take(self.trunk.try_forward(x)?)?;
-        }
-        Ok(())
+    fn through_trunk(&self, rows: ArrayView2<'_, f32>) -> Result<Batch<K>, NetworkError> {
+        let shape = (rows.nrows(), I::default());
+        let values = rows.iter().copied().collect();
+        let x: Batch<I> = Cpu::default().try_tensor_from_vec(values, shape)?;
+        Ok(self.trunk.try_forward(x)?)
     }
 
     pub(super) fn weights(&self) -> Vec<NamedTensor> {
@@ -150,15 +216,17 @@ where
         architecture: &'static str,
         weights: &[NamedTensor],
     ) -> Result<(), NetworkError> {
-        let surplus = |tensor: &NamedTensor| NetworkError::SurplusTensor {
-            name: tensor.name.clone(),
-            found: tensor.shape.clone(),
-            architecture,
+        let surplus = |tensor: &NamedTensor| {
+            let problem = format!(
+                "of shape {:?} has no place in `{architecture}`; was it stored by another architecture?",
+                tensor.shape
+            );
+            Err(NetworkError::tensor(&tensor.name, problem))
         };
         let mut stored = BTreeMap::new();
         for tensor in weights {
             if stored.insert(tensor.name.as_str(), tensor).is_some() {
-                return Err(surplus(tensor));
+                return surplus(tensor);
             }
         }
         tensors::assign(&mut self.trunk, "trunk", architecture, &mut stored)?;
@@ -168,6 +236,10 @@ where
         stored
             .values()
             .next()
-            .map_or(Ok(()), |tensor| Err(surplus(tensor)))
+            .map_or(Ok(()), |tensor| surplus(tensor))
     }
+}
+
+fn chunks(features: &Array2<f32>) -> impl Iterator<Item = ArrayView2<'_, f32>> {
+    features.axis_chunks_iter(Axis(0), CHUNK)
 }

@@ -1,20 +1,82 @@
-//! The object-safe faces: an architecture that trains networks, and a network that predicts.
+//! Networks whose types are no longer known: the faces that the estimator sees, over the static types of an architecture.
 
-use super::feed::{Data, Feed};
+use super::data::{Data, Feed, Purpose, Samples, derive, padded};
 use super::model::{self, Model, ModelOf};
-use super::rows::Rows;
-use super::seed::{Purpose, derive};
-use super::train::{Course, train};
-use super::{
-    Architecture, Checkpoints, HeadArchitecture, History, NamedTensor, Network, NetworkError,
-    Samples, Training,
-};
+use super::train::Course;
+use super::{Checkpoints, HeadArchitecture, History, NamedTensor, NetworkError, Training};
 use crate::progress::Progress;
 use dfdx::prelude::ConstDim;
 use ndarray::Array2;
-use std::fmt;
+use std::fmt::{self, Debug};
 use std::marker::PhantomData;
 use std::sync::Arc;
+
+/// An architecture behind an object-safe face; made by [`architecture`].
+pub trait Architecture: Send + Sync + Debug {
+    /// [`HeadArchitecture::ID`](super::HeadArchitecture::ID).
+    fn id(&self) -> &'static str;
+
+    /// The most features that it takes.
+    fn max_features(&self) -> usize;
+
+    /// Trains a new network on samples that the caller has standardised, by Adam on the loss of [`Training`]. The same
+    /// arguments give the same bits. Ticks the stage `train` once an epoch.
+    ///
+    /// Samples that come in several parts may be larger than memory: at most 64 MiB are held at a time. The last parts are then held out,
+    /// and each epoch takes the others in a new order, with the rows in memory shuffled.
+    ///
+    /// A training that was interrupted goes on with what `checkpoints` have kept of it, to the same bits.
+    fn train_on(
+        &self,
+        samples: &dyn Samples,
+        settings: &Training,
+        seed: u64,
+        checkpoints: &Checkpoints,
+        progress: &Progress,
+    ) -> Result<(Arc<dyn Network>, History), NetworkError>;
+
+    /// Puts a network of `inputs` features and `outputs` heads together from [`Network::weights`]. The error names the first
+    /// tensor that is missing, surplus, of another shape, or not finite.
+    fn restore(
+        &self,
+        inputs: usize,
+        outputs: usize,
+        weights: &[NamedTensor],
+    ) -> Result<Arc<dyn Network>, NetworkError>;
+}
+
+/// A trained network. It never changes: tuning makes another one.
+pub trait Network: Send + Sync + Debug {
+    /// Number of features, n.
+    fn inputs(&self) -> usize;
+
+    /// Number of heads, d.
+    fn outputs(&self) -> usize;
+
+    /// Predictions (samples × d) from `features` (samples × n), without dropout.
+    ///
+    /// A sample's prediction may differ in its last bits (1e-6) with the number of samples that come along.
+    fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError>;
+
+    /// The trunk's outputs (samples × hidden width), without dropout.
+    fn hidden(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError>;
+
+    /// A network with the same trunk, and heads trained further on `features` and `targets`.
+    ///
+    /// The trunk is evaluated once, without dropout; then only the heads train, on its output, starting where they are.
+    /// Ticks the stage `tune` once an epoch.
+    fn tune_heads(
+        &self,
+        features: &Array2<f64>,
+        targets: &Array2<f64>,
+        settings: &Training,
+        seed: u64,
+        progress: &Progress,
+    ) -> Result<(Arc<dyn Network>, History), NetworkError>;
+
+    /// All tensors, by names such as `trunk.0.weight` and `heads.2.1.gamma`, in a fixed order.
+    fn weights(&self) -> Vec<NamedTensor>;
+}
 
 /// Makes `A` usable where types are no longer known.
 pub fn architecture<A: HeadArchitecture>() -> Arc<dyn Architecture> {
@@ -24,18 +86,19 @@ pub fn architecture<A: HeadArchitecture>() -> Arc<dyn Architecture> {
             "DROPOUT must be at least 0 and below 1"
         );
     }
-    Arc::new(Of::<A>(PhantomData))
+    Arc::new(Typed::<A>(PhantomData))
 }
 
-struct Of<A>(PhantomData<fn() -> A>);
+/// An architecture by its static types.
+struct Typed<A>(PhantomData<fn() -> A>);
 
-impl<A: HeadArchitecture> fmt::Debug for Of<A> {
+impl<A: HeadArchitecture> fmt::Debug for Typed<A> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Architecture").field(&A::ID).finish()
     }
 }
 
-impl<A: HeadArchitecture> Of<A> {
+impl<A: HeadArchitecture> Typed<A> {
     fn build(inputs: usize, outputs: usize, seed: u64) -> Result<MultiHead<A>, NetworkError> {
         if inputs > A::Features::SIZE {
             return Err(NetworkError::TooManyFeatures {
@@ -55,7 +118,7 @@ impl<A: HeadArchitecture> Of<A> {
     }
 }
 
-impl<A: HeadArchitecture> Architecture for Of<A> {
+impl<A: HeadArchitecture> Architecture for Typed<A> {
     fn id(&self) -> &'static str {
         A::ID
     }
@@ -81,7 +144,6 @@ impl<A: HeadArchitecture> Architecture for Of<A> {
         };
         let width = A::Features::SIZE + samples.targets();
         let feed = Feed::new(&samples.parts(), width, &read, settings.holdout, seed)?;
-        let mut model = network.model.clone();
         let course = Course {
             settings,
             seed,
@@ -90,7 +152,7 @@ impl<A: HeadArchitecture> Architecture for Of<A> {
             progress,
             stage: "train",
         };
-        let history = train(&mut model, &feed, &course)?;
+        let (model, history) = network.model.clone().trained(&feed, &course)?;
         let inputs = network.inputs;
         Ok((Arc::new(MultiHead::<A> { inputs, model }), history))
     }
@@ -135,9 +197,9 @@ fn expect(what: &'static str, expected: usize, found: usize) -> Result<(), Netwo
 }
 
 impl<A: HeadArchitecture> MultiHead<A> {
-    fn rows(&self, features: &Array2<f64>) -> Result<Rows, NetworkError> {
+    fn rows(&self, features: &Array2<f64>) -> Result<Array2<f32>, NetworkError> {
         expect("features of a sample", self.inputs, features.ncols())?;
-        Rows::padded("features", features, A::Features::SIZE)
+        padded("features", features, A::Features::SIZE)
     }
 
     fn data(&self, features: &Array2<f64>, targets: &Array2<f64>) -> Result<Data, NetworkError> {
@@ -146,7 +208,7 @@ impl<A: HeadArchitecture> MultiHead<A> {
         expect("rows of targets", features.nrows(), targets.nrows())?;
         Ok(Data {
             features: self.rows(features)?,
-            targets: Rows::padded("targets", targets, outputs)?,
+            targets: padded("targets", targets, outputs)?,
         })
     }
 }
@@ -161,11 +223,11 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
     }
 
     fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
-        Ok(self.model.predict(&self.rows(features)?)?.to_matrix())
+        Ok((self.model.predict(&self.rows(features)?)?).mapv(f64::from))
     }
 
     fn hidden(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
-        Ok(self.model.hidden(&self.rows(features)?)?.to_matrix())
+        Ok((self.model.hidden(&self.rows(features)?)?).mapv(f64::from))
     }
 
     fn tune_heads(
@@ -188,7 +250,7 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
         let feed = Feed::new(&[features.nrows()], width, &read, settings.holdout, seed)?;
         // Heads alone are a model too, with a trunk that does nothing.
         let heads = self.model.heads.clone();
-        let mut heads = Model::<A::Hidden, A::Hidden, (), _>::new((), heads);
+        let heads = Model::<A::Hidden, A::Hidden, (), _>::new((), heads);
         let course = Course {
             settings,
             seed,
@@ -197,7 +259,7 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
             progress,
             stage: "tune",
         };
-        let history = train(&mut heads, &feed, &course)?;
+        let (heads, history) = heads.trained(&feed, &course)?;
         let tuned = Self {
             inputs: self.inputs,
             model: Model::new(self.model.trunk.clone(), heads.heads),

@@ -86,41 +86,31 @@ impl Training {
     ///
     /// [`SettingError`] names the first field outside its range, its value and the remedy.
     pub fn check(&self) -> Result<(), SettingError> {
-        let positive = |v: f64| v > 0.0 && v.is_finite();
         let not_negative = |v: f64| v >= 0.0 && v.is_finite();
-        let refuse =
-            |field: &str, value: String, remedy: &str| Err(SettingError::new(field, value, remedy));
-        if self.epochs == 0 {
-            return refuse("epochs", "0".into(), "must be at least 1");
-        }
-        if self.batch == 0 {
-            return refuse("batch", "0".into(), "must be at least 1");
+        for (field, count) in [("epochs", self.epochs), ("batch", self.batch)] {
+            SettingError::unless(count > 0, field, count, "must be at least 1")?;
         }
         for (field, value) in [
             ("learning_rate", self.learning_rate),
             ("huber_delta", self.huber_delta),
         ] {
-            if !positive(value) {
-                return refuse(field, value.to_string(), "must be finite and above 0");
-            }
+            let valid = value > 0.0 && value.is_finite();
+            SettingError::unless(valid, field, value, "must be finite and above 0")?;
         }
         for (field, value) in [
             ("weight_decay", self.weight_decay),
             ("orthogonality", self.orthogonality),
         ] {
-            if !not_negative(value) {
-                return refuse(field, value.to_string(), "must be finite and not below 0");
-            }
+            let remedy = "must be finite and not below 0";
+            SettingError::unless(not_negative(value), field, value, remedy)?;
         }
-        if let Some(w) = self.target_weights.iter().find(|w| !not_negative(**w)) {
+        for &weight in &self.target_weights {
             let remedy = "each weight must be finite and not below 0";
-            return refuse("target_weights", w.to_string(), remedy);
+            SettingError::unless(not_negative(weight), "target_weights", weight, remedy)?;
         }
-        if !(0.0..1.0).contains(&self.holdout) {
-            let remedy = "must be at least 0 and below 1; 0 keeps nothing out";
-            return refuse("holdout", self.holdout.to_string(), remedy);
-        }
-        Ok(())
+        let remedy = "must be at least 0 and below 1; 0 keeps nothing out";
+        let valid = (0.0..1.0).contains(&self.holdout);
+        SettingError::unless(valid, "holdout", self.holdout, remedy)
     }
 
     /// One weight for each of `outputs` targets.

@@ -243,7 +243,7 @@ fn altered_weights_are_refused_by_name() {
     );
     assert_eq!(
         refused(&|w| w[1].shape = vec![4, 6]),
-        "tensor `trunk.0.bias`: expected shape [24], found [4, 6] with 24 values"
+        "tensor `trunk.0.bias` has shape [4, 6] with 24 values, expected [24]"
     );
     assert!(refused(&|w| w[0].values.truncate(191)).contains("with 191 values"));
     assert!(refused(&|w| w.push(w[0].clone())).starts_with("tensor `trunk.0.weight`"));

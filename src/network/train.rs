@@ -2,11 +2,10 @@
 
 use super::adam::Adam;
 use super::checkpoints::{Position, State};
-use super::feed::{Block, Feed};
+use super::data::{Block, Feed, Purpose, derive, gathered};
 use super::loss::Loss;
-use super::model::Model;
-use super::seed::{Purpose, derive};
-use super::{Checkpoints, FirstWeight, History, Layers, NamedTensor, NetworkError, Training};
+use super::model::{FirstWeight, Layers, Model};
+use super::{Checkpoints, History, NamedTensor, NetworkError, Training};
 use crate::progress::{Progress, Stage};
 use dfdx::prelude::{Backward, Const, ConstDim, Cpu};
 
@@ -22,170 +21,184 @@ pub(super) struct Course<'a> {
     pub stage: &'static str,
 }
 
-/// Trains `model` in place; where rows are held out, it ends with the weights that were best on them.
-pub(super) fn train<I, K, T, H>(
-    model: &mut Model<I, K, T, H>,
-    feed: &Feed<'_>,
-    course: &Course<'_>,
-) -> Result<History, NetworkError>
+/// A training under way: everything that its rest depends on.
+struct Trainee<M> {
+    model: M,
+    at: Position,
+    adam: Adam,
+    /// The model that was best on the rows held out.
+    best: Option<M>,
+}
+
+impl<I, K, T, H> Model<I, K, T, H>
 where
     I: ConstDim,
     K: ConstDim,
     T: Layers<I, K>,
     H: Layers<K, Const<1>> + FirstWeight<K>,
 {
-    let &Course { settings, seed, .. } = course;
-    let loss = Loss {
-        weights: settings.weights_for(model.heads.len())?,
-        delta: settings.huber_delta as f32,
-        orthogonality: settings.orthogonality as f32,
-    };
-    let (mut at, mut adam, mut best) = begin(model, course);
-    let rows = feed.rows() as f64;
-    let blocks = feed.blocks(0, seed).len();
-    let stage = (course.progress).stage(course.stage, settings.epochs * blocks);
-    stage.skip(at.epoch * blocks + at.block);
-    while at.epoch < settings.epochs {
-        let learning_rate = settings.rate(at.epoch);
-        let diverged = NetworkError::Diverged {
-            epoch: at.epoch + 1,
-            learning_rate,
+    /// Trains the model; where rows are held out, it ends with the weights that were best on them.
+    pub(super) fn trained(
+        self,
+        feed: &Feed<'_>,
+        course: &Course<'_>,
+    ) -> Result<(Self, History), NetworkError> {
+        let settings = course.settings;
+        let loss = Loss {
+            weights: settings.weights_for(self.heads.len())?,
+            delta: settings.huber_delta as f32,
+            orthogonality: settings.orthogonality as f32,
         };
-        let parts = feed.blocks(at.epoch, seed);
-        while at.block < parts.len() {
-            let Block { data, order } = feed.block(&parts[at.block], at.block, at.epoch, seed)?;
-            for batch in order.chunks(settings.batch) {
-                let device = Cpu::seed_from_u64(derive(seed, Purpose::Dropout, at.step));
-                at.step += 1;
-                let predictions = model.forward_taped(data.features.gather(batch), &device)?;
-                let targets = data.targets.gather(batch);
-                let (error, taped) = loss.taped(predictions, &targets, &model.heads)?;
-                if !error.is_finite() {
-                    return Err(diverged);
-                }
-                at.total += error * batch.len() as f64;
-                let mut gradients = taped.try_backward()?;
-                let mut adam = adam.step(learning_rate, &mut gradients);
-                adam.update(&mut model.trunk)?;
-                for head in &mut model.heads {
-                    adam.update(head)?;
-                }
+        let mut trainee = Trainee::begin(self, course);
+        let blocks = feed.blocks(0).len();
+        let stage = (course.progress).stage(course.stage, settings.epochs * blocks);
+        stage.skip(trainee.at.epoch * blocks + trainee.at.block);
+        while trainee.at.epoch < settings.epochs {
+            trainee.epoch(feed, &loss, course, &stage)?;
+            if trainee.has_converged(settings) {
+                stage.finish();
+                break;
             }
-            at.block += 1;
-            if at.block < parts.len() {
-                done(course, &stage, &at, model, best.as_ref(), &adam)?;
-            }
+            trainee.at.next_epoch();
+            trainee.keep(course, &stage)?;
         }
-        at.history.training.push(at.total / rows);
-        at.history.epochs_run = at.epoch + 1;
-        at.history.best_epoch = at.epoch;
-        let mut stop = false;
-        let held_out = feed.held_out(|data| {
-            let predictions = model.predict(&data.features)?;
-            Ok(loss.error(predictions.numbers(), data.targets.numbers()))
-        })?;
-        if let Some(error) = held_out {
-            if !error.is_finite() {
-                return Err(diverged);
-            }
-            at.history.holdout.push(error);
-            if at.best.is_none_or(|(least, _)| error < least) {
-                at.best = Some((error, at.epoch));
-                best = Some(model.clone());
-            }
-            at.history.best_epoch = at.best.map_or(at.epoch, |(_, epoch)| epoch);
-            stop = settings.patience > 0 && at.epoch - at.history.best_epoch >= settings.patience;
+        let Trainee {
+            model, at, best, ..
+        } = trainee;
+        let model = best.unwrap_or(model);
+        // Without holdout rows nothing has looked at the weights since the last step.
+        let finite = |tensor: &NamedTensor| tensor.values.iter().all(|v| v.is_finite());
+        match model.weights().iter().all(finite) {
+            true => Ok((model, at.history)),
+            false => Err(diverged(settings, at.history.epochs_run - 1)),
         }
-        if stop {
-            stage.finish();
-            break;
-        }
-        (at.epoch, at.block, at.total) = (at.epoch + 1, 0, 0.0);
-        done(course, &stage, &at, model, best.as_ref(), &adam)?;
     }
-    let history = at.history;
-    if let Some(best) = best {
-        *model = best;
-    }
-    // Without holdout rows nothing has looked at the weights since the last step.
-    let finite = |tensor: &NamedTensor| tensor.values.iter().all(|v| v.is_finite());
-    if !model.weights().iter().all(finite) {
-        return Err(NetworkError::Diverged {
-            epoch: history.epochs_run,
-            learning_rate: settings.rate(history.epochs_run - 1),
-        });
-    }
-    Ok(history)
 }
 
-/// A block is done: says so, and keeps the state if it is time to, or if the work is to stop.
-fn done<I, K, T, H>(
-    course: &Course<'_>,
-    stage: &Stage,
-    at: &Position,
-    model: &Model<I, K, T, H>,
-    best: Option<&Model<I, K, T, H>>,
-    adam: &Adam,
-) -> Result<(), NetworkError>
+fn diverged(settings: &Training, epoch: usize) -> NetworkError {
+    NetworkError::Diverged {
+        epoch: epoch + 1,
+        learning_rate: settings.rate(epoch),
+    }
+}
+
+impl<I, K, T, H> Trainee<Model<I, K, T, H>>
 where
     I: ConstDim,
     K: ConstDim,
     T: Layers<I, K>,
     H: Layers<K, Const<1>> + FirstWeight<K>,
 {
-    let stopped = stage.tick();
-    course.checkpoints.keep(stopped.is_err(), || State {
-        position: at.clone(),
-        weights: model.weights(),
-        best: best.map_or(vec![], Model::weights),
-        adam: adam.clone(),
-    })?;
-    Ok(stopped?)
-}
-
-/// Where a training begins, Adam, and the weights that were best so far.
-type Begun<M> = (Position, Adam, Option<M>);
-
-/// Begins with what was kept, else anew.
-fn begin<I, K, T, H>(model: &mut Model<I, K, T, H>, course: &Course<'_>) -> Begun<Model<I, K, T, H>>
-where
-    I: ConstDim,
-    K: ConstDim,
-    T: Layers<I, K>,
-    H: Layers<K, Const<1>> + FirstWeight<K>,
-{
-    let decay = course.settings.weight_decay;
-    let kept = course.checkpoints.load(decay).and_then(|state| {
-        let restored = |weights| {
+    /// Begins with what was kept, else anew.
+    fn begin(model: Model<I, K, T, H>, course: &Course<'_>) -> Self {
+        let decay = course.settings.weight_decay;
+        let restored = |weights: &[NamedTensor]| {
             let mut restored = model.clone();
             restored.restore(course.architecture, weights).ok()?;
             Some(restored)
         };
-        let now = restored(&state.weights)?;
-        let best = match state.position.best {
-            Some(_) => Some(restored(&state.best)?),
-            None => None,
-        };
-        Some((now, best, state))
-    });
-    match kept {
-        Some((now, best, state)) => {
-            *model = now;
-            (state.position, state.adam, best)
+        let kept = course.checkpoints.load(decay).and_then(|state| {
+            Some(Self {
+                model: restored(&state.weights)?,
+                best: match state.position.best {
+                    Some(_) => Some(restored(&state.best)?),
+                    None => None,
+                },
+                at: state.position,
+                adam: state.adam,
+            })
+        });
+        kept.unwrap_or_else(|| Self {
+            model: model.clone(),
+            at: Position::default(),
+            adam: Adam::new(decay),
+            best: None,
+        })
+    }
+
+    /// Trains the rest of an epoch, and measures it.
+    fn epoch(
+        &mut self,
+        feed: &Feed<'_>,
+        loss: &Loss,
+        course: &Course<'_>,
+        stage: &Stage,
+    ) -> Result<(), NetworkError> {
+        let &Course { settings, seed, .. } = course;
+        let epoch = self.at.epoch;
+        let parts = feed.blocks(epoch);
+        while self.at.block < parts.len() {
+            let Block { data, order } = feed.block(&parts[self.at.block], self.at.block, epoch)?;
+            for batch in order.chunks(settings.batch) {
+                let device = Cpu::seed_from_u64(derive(seed, Purpose::Dropout, self.at.step));
+                self.at.step += 1;
+                let predictions = (self.model).forward_taped(&data.features, batch, &device)?;
+                let targets = gathered(&data.targets, batch);
+                let (error, taped) = loss.taped(predictions, &targets, &self.model.heads)?;
+                if !error.is_finite() {
+                    return Err(diverged(settings, epoch));
+                }
+                self.at.total += error * batch.len() as f64;
+                let mut gradients = taped.try_backward()?;
+                let mut step = self.adam.step(settings.rate(epoch), &mut gradients);
+                step.update(&mut self.model.trunk)?;
+                for head in &mut self.model.heads {
+                    step.update(head)?;
+                }
+            }
+            self.at.block += 1;
+            if self.at.block < parts.len() {
+                self.keep(course, stage)?;
+            }
         }
-        None => (Position::default(), Adam::new(decay), None),
+        let history = &mut self.at.history;
+        history.training.push(self.at.total / feed.rows() as f64);
+        history.epochs_run = epoch + 1;
+        history.best_epoch = epoch;
+        let held_out = feed
+            .held_out(|data| Ok(loss.error(&self.model.predict(&data.features)?, &data.targets)))?;
+        if let Some(error) = held_out {
+            if !error.is_finite() {
+                return Err(diverged(settings, epoch));
+            }
+            history.holdout.push(error);
+            if self.at.best.is_none_or(|(least, _)| error < least) {
+                self.at.best = Some((error, epoch));
+                self.best = Some(self.model.clone());
+            }
+            history.best_epoch = self.at.best.map_or(epoch, |(_, epoch)| epoch);
+        }
+        Ok(())
+    }
+
+    /// Returns whether the rows held out have seen no better epoch for too long.
+    fn has_converged(&self, settings: &Training) -> bool {
+        let since = self.at.epoch - self.at.history.best_epoch;
+        settings.patience > 0 && self.at.best.is_some() && since >= settings.patience
+    }
+
+    /// Reports a block, and keeps the state if it is time to, or if the work is to stop.
+    fn keep(&self, course: &Course<'_>, stage: &Stage) -> Result<(), NetworkError> {
+        let stopped = stage.tick();
+        course.checkpoints.keep(stopped.is_err(), || State {
+            position: self.at.clone(),
+            weights: self.model.weights(),
+            best: self.best.as_ref().map_or(vec![], Model::weights),
+            adam: self.adam.clone(),
+        })?;
+        Ok(stopped?)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::feed::Data;
+    use crate::network::data::Data;
     use crate::network::layers::*;
     use crate::network::model;
-    use crate::network::rows::Rows;
     use crate::progress::Listener;
-    use dfdx::prelude::{Cpu, DeviceBuildExt, SplitTape, TensorFromVec, Trace};
+    use dfdx::prelude::{DeviceBuildExt, SplitTape, TensorFromVec, Trace};
+    use ndarray::Array2;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::time::Duration;
@@ -197,7 +210,7 @@ mod tests {
         where
             L: Layers<Const<8>, Const<8>>,
         {
-            crate::network::tensors::set_dropout(&mut layers, 0.5);
+            crate::network::tensors::set_dropout(&mut layers, 0.5).unwrap();
             let device = Cpu::seed_from_u64(seed);
             let x = (0..80).map(|i| (i % 7) as f32 - 3.0).collect();
             let x = device.tensor_from_vec(x, (10, Const::<8>)).leaky_traced();
@@ -247,8 +260,8 @@ mod tests {
         let read = |part: usize| {
             let number = |i: usize| ((part * 20 + i) as f32 * 0.618).fract() - 0.5;
             Ok(Data {
-                features: Rows::new(2, (0..40).map(number).collect()),
-                targets: Rows::new(1, (0..20).map(|i| number(2 * i)).collect()),
+                features: Array2::from_shape_fn((20, 2), |(i, j)| number(2 * i + j)),
+                targets: Array2::from_shape_fn((20, 1), |(i, _)| number(2 * i)),
             })
         };
         for (most, holdout, blocks) in [(1000, 0.2, 1), (40, 0.2, 2), (40, 0.0, 3)] {
@@ -260,9 +273,9 @@ mod tests {
                 ..Training::default()
             };
             let feed = Feed::with_block(&[20; 6], most, &read, holdout, 1).unwrap();
-            assert_eq!(feed.blocks(0, 1).len(), blocks);
+            assert_eq!(feed.blocks(0).len(), blocks);
             let run = |checkpoints: &Checkpoints, progress: &Progress| {
-                let mut model = model::build::<Small>(2, 1, 1).unwrap();
+                let model = model::build::<Small>(2, 1, 1).unwrap();
                 let course = Course {
                     settings: &settings,
                     seed: 1,
@@ -271,7 +284,8 @@ mod tests {
                     progress,
                     stage: "train",
                 };
-                train(&mut model, &feed, &course).map(|history| (model.weights(), history))
+                let (model, history) = model.trained(&feed, &course)?;
+                Ok((model.weights(), history))
             };
             let whole = run(&Checkpoints::none(), &Progress::silent()).unwrap();
             let place = tempfile::tempdir().unwrap();

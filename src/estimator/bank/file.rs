@@ -8,8 +8,7 @@
 //! Both keep every bit. The same draws give the same bytes: an archive carries no time.
 
 use super::draws::Draws;
-use super::npy;
-use super::npz::{Npz, archive};
+use super::npy::{self, Npz, archive};
 use crate::estimator::error::EstimatorError;
 use crate::storage::files::write_new;
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt};

@@ -4,16 +4,16 @@
 //! |---|---|
 //! | simulate a twin and take features | [`FeatureSimulator`] |
 //! | make many rows, each a pure function of its number | [`FeatureSimulator::draws`], [`Draws`] |
+//! | simulate from a study's prior | [`Prior`] |
 //! | train on more rows than fit into memory | [`Bank`] |
 //! | exchange rows with NumPy and spreadsheets | [`file`] |
 
 mod draws;
 pub mod file;
 mod npy;
-mod npz;
-mod parts;
+mod prior;
 mod simulator;
 
-pub use draws::{Draw, Draws};
-pub use parts::Bank;
+pub use draws::{Bank, Draw, Draws};
+pub use prior::Prior;
 pub use simulator::FeatureSimulator;

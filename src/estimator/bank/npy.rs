@@ -1,20 +1,21 @@
-//! NumPy's `.npy` format: a text header, then the numbers of one matrix.
+//! NumPy's files: `.npy`, a text header and the numbers of one matrix; `.npz`, an archive of them.
 //!
-//! The header's shape is checked against the number of bytes that follow before memory is allocated.
+//! A file may be cut off, a bomb, or something else: a ZIP entry of a few bytes may claim any size, and an array any shape. Both are
+//! believed only where they agree with each other and with a limit, before memory is allocated.
 //!
 //! Source: NumPy Enhancement Proposal 1, "A simple file format for NumPy arrays".
 
-use crate::storage::untrusted::MOST_NUMBERS;
-use ndarray::{Array2, ShapeBuilder};
-use std::io::{self, Read, Write};
+use crate::storage::untrusted::{MOST_NUMBERS, message};
+use ndarray::{Array2, Ix2, Shape, ShapeBuilder};
+use std::io::{self, Cursor, Read, Seek, Write};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// Longest header that is read, in bytes; NumPy writes 128 for a matrix.
 const LONGEST_HEADER: usize = 4096;
 /// The header's length is a multiple of this.
 const ALIGNMENT: usize = 64;
-/// Numbers that memory is allocated for before any is read.
-const FIRST_NUMBERS: usize = 1 << 16;
 
 /// Writes a matrix of 64-bit numbers, little-endian, in the order it has in memory.
 pub(super) fn write(matrix: &Array2<f64>, to: &mut impl Write) -> io::Result<()> {
@@ -40,16 +41,16 @@ pub(super) fn write(matrix: &Array2<f64>, to: &mut impl Write) -> io::Result<()>
 /// Reads a matrix of 64-bit or 32-bit numbers from `size` bytes.
 pub(super) fn read(from: &mut impl Read, size: u64) -> Result<Array2<f64>, String> {
     let (text, rest) = header_text(from, size)?;
-    let header = Header::parse(&text, rest)?;
-    let mut numbers = Vec::with_capacity(header.numbers().min(FIRST_NUMBERS));
-    let mut bytes = [0; 8];
-    let bytes = &mut bytes[..header.bytes];
-    for _ in 0..header.numbers() {
-        (from.read_exact(bytes)).map_err(|error| format!("its numbers cannot be read: {error}"))?;
-        numbers.push(header.number(bytes));
-    }
-    let shape = (header.rows, header.columns).set_f(header.by_columns);
-    Array2::from_shape_vec(shape, numbers).map_err(|error| error.to_string())
+    let Header {
+        shape,
+        width,
+        number,
+    } = Header::parse(&text, rest)?;
+    let mut bytes = Vec::new();
+    let unread = |error: &dyn std::fmt::Display| format!("its numbers cannot be read: {error}");
+    (from.take(rest).read_to_end(&mut bytes)).map_err(|error| unread(&error))?;
+    let numbers = bytes.chunks_exact(width).map(number).collect();
+    Array2::from_shape_vec(shape, numbers).map_err(|error| unread(&error))
 }
 
 /// Reads the header's text; also returns the number of bytes after it.
@@ -76,14 +77,12 @@ fn header_text(from: &mut impl Read, size: u64) -> Result<(String, u64), String>
     Ok((text, size - (start.len() + width + length) as u64))
 }
 
-#[derive(Debug, PartialEq)]
 struct Header {
-    /// Bytes of a number, 8 or 4.
-    bytes: usize,
-    big_endian: bool,
-    by_columns: bool,
-    rows: usize,
-    columns: usize,
+    shape: Shape<Ix2>,
+    /// Bytes of a number.
+    width: usize,
+    /// The number in these bytes.
+    number: fn(&[u8]) -> f64,
 }
 
 impl Header {
@@ -106,11 +105,15 @@ impl Header {
                 _ => return Err(no_matrix()),
             }
         }
-        let (big_endian, bytes) = match descriptor.ok_or_else(no_matrix)? {
-            "'<f8'" => (false, 8),
-            "'<f4'" => (false, 4),
-            "'>f8'" => (true, 8),
-            "'>f4'" => (true, 4),
+        let (width, number): (usize, fn(&[u8]) -> f64) = match descriptor.ok_or_else(no_matrix)? {
+            "'<f8'" => (8, |b| b.try_into().map_or(f64::NAN, f64::from_le_bytes)),
+            "'>f8'" => (8, |b| b.try_into().map_or(f64::NAN, f64::from_be_bytes)),
+            "'<f4'" => (4, |b| {
+                b.try_into().map_or(f32::NAN, f32::from_le_bytes).into()
+            }),
+            "'>f4'" => (4, |b| {
+                b.try_into().map_or(f32::NAN, f32::from_be_bytes).into()
+            }),
             other => return Err(format!("its numbers are {other}; give f8 or f4")),
         };
         let by_columns = match order {
@@ -130,36 +133,59 @@ impl Header {
             Some(numbers) if numbers > MOST_NUMBERS as u64 => Err(format!(
                 "its shape ({shape}) has more than {MOST_NUMBERS} numbers; keep such a bank in shards"
             )),
-            Some(numbers) if numbers * bytes as u64 == rest => Ok(Self {
-                bytes,
-                big_endian,
-                by_columns,
-                rows: rows as usize,
-                columns: columns as usize,
+            Some(numbers) if numbers * width as u64 == rest => Ok(Self {
+                shape: (rows as usize, columns as usize).set_f(by_columns),
+                width,
+                number,
             }),
             _ => Err(format!(
                 "its shape ({shape}) does not fit the {rest} bytes that it has"
             )),
         }
     }
+}
 
-    fn numbers(&self) -> usize {
-        self.rows * self.columns
+/// Returns the bytes of an archive, not compressed; the same matrices give the same bytes.
+pub(super) fn archive(matrices: &[(&str, &Array2<f64>)]) -> io::Result<Vec<u8>> {
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .last_modified_time(DateTime::default());
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, matrix) in matrices {
+        archive.start_file(format!("{name}.npy"), options)?;
+        write(matrix, &mut archive)?;
+    }
+    Ok(archive.finish()?.into_inner())
+}
+
+/// An archive to read from.
+pub(super) struct Npz<R>(ZipArchive<R>);
+
+impl<R: Read + Seek> Npz<R> {
+    pub fn new(from: R) -> Result<Self, String> {
+        let archive = ZipArchive::new(from).map_err(|error| error.to_string())?;
+        Ok(Self(archive))
     }
 
-    /// The number in `bytes`, which are as many as the header says.
-    fn number(&self, bytes: &[u8]) -> f64 {
-        let mut little = [0; 8];
-        little[..self.bytes].copy_from_slice(bytes);
-        if self.big_endian {
-            little[..self.bytes].reverse();
-        }
-        if self.bytes == 8 {
-            f64::from_le_bytes(little)
-        } else {
-            let [a, b, c, d, ..] = little;
-            f32::from_le_bytes([a, b, c, d]).into()
-        }
+    /// Reads the matrix of this name.
+    pub fn matrix(&mut self, name: &str) -> Result<Array2<f64>, String> {
+        let file = format!("{name}.npy");
+        // Some writers leave the ending out.
+        let index = (self.0.index_for_name(&file)).or_else(|| self.0.index_for_name(name));
+        let index = index.ok_or_else(|| format!("it has no array {name}"))?;
+        let entry = (self.0.by_index(index)).map_err(|error| format!("{name}: {error}"))?;
+        let size = entry.size();
+        // What is unpacked may be longer than the archive says: no more than that is read.
+        let mut entry = io::BufReader::new(entry.take(size));
+        let matrix = read(&mut entry, size);
+        // The archive compares its checksum once nothing is left to read.
+        let rest = entry.into_inner().into_inner().read(&mut [0]);
+        (matrix.and_then(|matrix| match rest {
+            Ok(0) => Ok(matrix),
+            Ok(_) => Err("it is longer than the archive says".into()),
+            Err(error) => Err(error.to_string()),
+        }))
+        .map_err(|problem| format!("{name}: {}", message(&problem)))
     }
 }
 

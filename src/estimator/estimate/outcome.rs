@@ -131,7 +131,7 @@ pub struct Estimate {
     pub initial: PointEstimate,
     /// The test of the network's estimate.
     pub gate: GateOutcome,
-    /// What followed.
+    /// Stages after that test.
     pub(crate) stages: Stages,
     /// Noise levels that the record shows in place of those that the twin declares; simulations take them.
     pub noise: Vec<FittedNoise>,

@@ -4,7 +4,7 @@ use crate::estimator::bank::Draws;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::readout::{
-    Calibration, INTERVAL_LEVEL, Layer, Readout, Scaler, Spread, Standardiser,
+    Calibration, INTERVAL_LEVEL, QuadraticLayer, Readout, Scaler, Spread, Standardiser,
 };
 use crate::estimator::refine::Refined;
 use crate::estimator::settings::Settings;
@@ -94,7 +94,11 @@ pub fn tune(tuning: &Tuning<'_>) -> Result<Tuned, EstimatorError> {
         )
     };
     let (z, y) = (inputs.apply(&features), targets.apply(&theta));
-    let mut layer = (settings.cloud.quadratic.then(|| Layer::fit(&z, &y))).flatten();
+    let mut layer = (settings
+        .cloud
+        .quadratic
+        .then(|| QuadraticLayer::fit(&z, &y)))
+    .flatten();
     let goal = layer
         .as_ref()
         .map_or_else(|| y.clone(), |layer| layer.rest(&z, &y));

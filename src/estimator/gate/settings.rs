@@ -64,37 +64,23 @@ impl Default for GateSettings {
 impl GateSettings {
     /// Checks whether each field is in its range.
     pub fn check(&self) -> Result<(), SettingError> {
-        let refuse = |field: &str, value: f64, remedy: &str| {
-            Err(SettingError::new(format!("gate: {field}"), value, remedy))
+        let unless = |valid: bool, field: &str, value: f64, remedy: &str| {
+            SettingError::unless(valid, format!("gate: {field}"), value, remedy)
         };
-        if !(self.alpha > 0.0 && self.alpha < 1.0) {
-            return refuse("alpha", self.alpha, "choose a rate between 0 and 1");
+        let alpha = self.alpha;
+        let valid = alpha > 0.0 && alpha < 1.0;
+        unless(valid, "alpha", alpha, "choose a rate between 0 and 1")?;
+        for (field, count) in [
+            ("simulations", self.simulations),
+            ("per_feature", self.per_feature),
+        ] {
+            unless(count >= 2, field, count as f64, "at least 2 are needed")?;
         }
-        if self.simulations < 2 {
-            return refuse(
-                "simulations",
-                self.simulations as f64,
-                "at least 2 are needed",
-            );
-        }
-        if self.per_feature < 2 {
-            return refuse(
-                "per_feature",
-                self.per_feature as f64,
-                "at least 2 are needed",
-            );
-        }
-        if (self.null as f64) < 1.0 / self.alpha - 1.0 {
-            return refuse(
-                "null",
-                self.null as f64,
-                "take at least 1/alpha - 1, or p can never fall below alpha",
-            );
-        }
-        if !(self.epsilon > 0.0 && self.epsilon.is_finite()) {
-            return refuse("epsilon", self.epsilon, "must be positive");
-        }
-        Ok(())
+        let null = self.null as f64;
+        let remedy = "take at least 1/alpha - 1, or p can never fall below alpha";
+        unless(null >= 1.0 / alpha - 1.0, "null", null, remedy)?;
+        let valid = self.epsilon > 0.0 && self.epsilon.is_finite();
+        unless(valid, "epsilon", self.epsilon, "must be positive")
     }
 
     /// Simulations for μ and S of n features.

@@ -1,7 +1,7 @@
 //! A pretraining that can be interrupted.
 
-use super::train::{PretrainOptions, fits_into_memory, pretrain_from, prior, settings};
-use crate::estimator::bank::{Bank, Draws};
+use super::train::{Plan, PretrainOptions};
+use crate::estimator::bank::Bank;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::project::Project;
@@ -109,42 +109,43 @@ impl<'a> Pretraining<'a> {
         progress: &Progress,
     ) -> Result<(Estimator, History), EstimatorError> {
         let checkpoints = Checkpoints::new(folder.file(TRAINING), self.every);
+        // What the network cannot take is said before anything is simulated.
+        let plan = Plan::new(&self.project, self.sized())?;
         let simulated;
         let bank = match &self.bank {
             Some(given) => given.bank,
             None => {
-                simulated = self.simulated(&folder.file(BANK), progress)?;
+                let path = folder.file(BANK);
+                let bank = BankPlan {
+                    project: self.project.clone(),
+                    preset: self.options.preset,
+                    size: plan.size_in_memory()?,
+                    seed: self.options.seed,
+                };
+                bank.fill(&path, Share::WHOLE, progress)?;
+                // As one part: rows in the order in which they would be without a folder.
+                simulated = ShardedBank::open(&path)?.read()?;
                 &simulated
             }
         };
-        pretrain_from(&self.project, bank, &self.options, &checkpoints, progress)
+        plan.train(bank, &checkpoints, progress)
     }
 
-    /// The bank in the folder, made as far as it is missing, as one part: rows in the order in which they would be without a folder.
-    fn simulated(&self, path: &Path, progress: &Progress) -> Result<Draws, EstimatorError> {
-        let size = settings(&self.project, &self.options)?.bank_size;
-        fits_into_memory(size)?;
-        // What the network cannot take is said before anything is simulated.
-        prior(&self.project, &self.options)?;
-        let plan = BankPlan {
-            project: self.project.clone(),
-            preset: self.options.preset,
-            size,
-            seed: self.options.seed,
-        };
-        plan.fill(path, Share::WHOLE, progress)?;
-        ShardedBank::open(path)?.read()
+    /// The options, with the size of the bank that is given.
+    fn sized(&self) -> PretrainOptions {
+        let given = self.bank.as_ref().map(|given| given.bank.rows());
+        PretrainOptions {
+            bank_size: given.or(self.options.bank_size),
+            ..self.options
+        }
     }
 
     /// Everything that the estimator depends on.
     fn manifest(&self) -> Result<Manifest, EstimatorError> {
         let preset = self.project.recipe(self.options.preset);
-        let mut settings = settings(&self.project, &self.options)?;
+        let settings = Plan::new(&self.project, self.sized())?.settings;
         let bank = match &self.bank {
-            Some(given) => {
-                settings.bank_size = given.bank.rows();
-                given.checksum.clone()
-            }
+            Some(given) => given.checksum.clone(),
             None => "simulated".into(),
         };
         Ok(self

@@ -1,6 +1,6 @@
 //! Training on a bank on disk.
 
-use super::train::pretrain_from;
+use super::train::Plan;
 use super::{PretrainOptions, pretrain};
 use crate::estimator::bank::{Bank, Draws};
 use crate::estimator::shards::ShardedBank;
@@ -18,8 +18,11 @@ fn pretrain_on(
     bank: &dyn Bank,
     options: &PretrainOptions,
 ) -> Result<(Estimator, History), EstimatorError> {
-    let nowhere = Checkpoints::none();
-    pretrain_from(&study.into(), bank, options, &nowhere, &Progress::silent())
+    let options = PretrainOptions {
+        bank_size: Some(bank.rows()),
+        ..*options
+    };
+    Plan::new(&study.into(), options)?.train(bank, &Checkpoints::none(), &Progress::silent())
 }
 
 fn options(size: usize) -> PretrainOptions {

@@ -1,13 +1,12 @@
 //! Bank and training.
 
-use crate::estimator::bank::{Bank, Draws};
+use crate::estimator::bank::{Bank, Draws, Prior};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::project::Project;
 use crate::estimator::readout::{Calibration, Readout, Scaler, Standardiser};
 use crate::estimator::recipe::PresetName;
 use crate::estimator::settings::{Inputs, Settings};
-use crate::estimator::shards::Prior;
 use crate::network::{Checkpoints, History, Part, Samples};
 use crate::progress::Progress;
 use ndarray::Array2;
@@ -52,157 +51,134 @@ pub fn pretrain(
     progress: &Progress,
 ) -> Result<(Estimator, History), EstimatorError> {
     let project = &project.into();
-    let settings = settings(project, options)?;
-    let size = settings.bank_size;
-    fits_into_memory(size)?;
-    let prior = prior(project, options)?;
+    let plan = Plan::new(project, *options)?;
+    let size = plan.size_in_memory()?;
     let stage = progress.stage("bank", size);
-    let bank = prior.rows(0..size as u64, options.seed, "bank", &stage)?;
-    let nowhere = Checkpoints::none();
-    train(
-        project, options, settings, &prior, &bank, &nowhere, progress,
-    )
+    let bank = (plan.prior).rows(0..size as u64, options.seed, "bank", &stage)?;
+    plan.train(&bank, &Checkpoints::none(), progress)
 }
 
-/// Trains the network on a bank that is there, of this study's prior and the preset's features; goes on with what was kept of the training.
-///
-/// A bank of at most 64 MiB as 32-bit numbers gives, row for row, the estimator of [`pretrain`]; of a larger one, no more than
-/// that is in memory at a time.
-///
-/// # Errors
-///
-/// [`EstimatorError`]; also for rows of another width.
-pub(super) fn pretrain_from(
-    project: &Project,
-    bank: &dyn Bank,
-    options: &PretrainOptions,
-    checkpoints: &Checkpoints,
-    progress: &Progress,
-) -> Result<(Estimator, History), EstimatorError> {
-    let options = PretrainOptions {
-        bank_size: Some(bank.rows()),
-        ..*options
-    };
-    let settings = settings(project, &options)?;
-    let prior = prior(project, &options)?;
-    train(
-        project,
-        &options,
-        settings,
-        &prior,
-        bank,
-        checkpoints,
-        progress,
-    )
+/// A pretraining whose settings are checked and whose features the network takes.
+pub(super) struct Plan<'a> {
+    project: &'a Project,
+    options: PretrainOptions,
+    /// The preset's numbers with those that the options replace.
+    pub settings: Settings,
+    /// The prior through the preset's features.
+    prior: Prior,
 }
 
-/// Refuses a bank that is too large.
-pub(super) fn fits_into_memory(size: usize) -> Result<(), EstimatorError> {
-    if size <= MOST_IN_MEMORY {
-        return Ok(());
-    }
-    Err(EstimatorError::Bank(format!(
-        "bank size = {size}; at most {MOST_IN_MEMORY} fit into memory: make a bank on disk, then pretrain from it"
-    )))
-}
-
-/// The preset's numbers with what the options say otherwise, checked.
-pub(super) fn settings(
-    project: &Project,
-    options: &PretrainOptions,
-) -> Result<Settings, EstimatorError> {
-    let mut settings = project.recipe(options.preset).settings.clone();
-    settings.bank_size = options.bank_size.unwrap_or(settings.bank_size);
-    settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
-    settings.check()?;
-    Ok(settings)
-}
-
-/// The prior through the preset's features, which the network must take.
-pub(super) fn prior(project: &Project, options: &PretrainOptions) -> Result<Prior, EstimatorError> {
-    project.study().check_estimated()?;
-    let preset = project.recipe(options.preset);
-    let prior = Prior::new(project.study(), preset.features.as_ref())?;
-    let most = preset.architecture.max_features();
-    if prior.dim() > most {
-        return Err(EstimatorError::Inputs(format!(
-            "the features are {} numbers, network \"{}\" takes at most {most}; lower their order or choose a wider network",
-            prior.dim(),
-            preset.architecture.id()
-        )));
-    }
-    Ok(prior)
-}
-
-fn train(
-    project: &Project,
-    options: &PretrainOptions,
-    settings: Settings,
-    prior: &Prior,
-    bank: &dyn Bank,
-    checkpoints: &Checkpoints,
-    progress: &Progress,
-) -> Result<(Estimator, History), EstimatorError> {
-    let preset = project.recipe(options.preset);
-    let seed = options.seed;
-    let first = first_rows(bank)?;
-    for (what, given, expected) in [
-        (
-            "parameters",
-            first.theta.ncols(),
-            project.study().twin().parameters().len(),
-        ),
-        ("features", first.features.ncols(), prior.dim()),
-    ] {
-        if given != expected {
-            return Err(EstimatorError::Bank(format!(
-                "the bank has {given} {what}, twin and preset have {expected}; make a bank with this study and preset"
+impl<'a> Plan<'a> {
+    pub fn new(project: &'a Project, options: PretrainOptions) -> Result<Self, EstimatorError> {
+        let recipe = project.recipe(options.preset);
+        let mut settings = recipe.settings.clone();
+        settings.bank_size = options.bank_size.unwrap_or(settings.bank_size);
+        settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
+        settings.check()?;
+        let prior = Prior::new(project.study(), recipe.features.as_ref())?;
+        let most = recipe.architecture.max_features();
+        if prior.dim() > most {
+            return Err(EstimatorError::Inputs(format!(
+                "the features are {} numbers, network \"{}\" takes at most {most}; lower their order or choose a wider network",
+                prior.dim(),
+                recipe.architecture.id()
             )));
         }
+        Ok(Self {
+            project,
+            options,
+            settings,
+            prior,
+        })
     }
-    let inputs = match settings.inputs {
-        Inputs::Each => Standardiser::each(&first.features),
-        Inputs::Principal => Standardiser::principal(&first.features, LIMIT).map_err(|error| {
-            EstimatorError::Inputs(format!(
-                "the features of the bank cannot be standardised: {error}"
-            ))
-        })?,
-    };
-    let targets = Scaler::fit(&first.theta);
-    let samples = Standardised {
-        bank,
-        inputs: &inputs,
-        targets: &targets,
-    };
-    let (network, history) = (preset.architecture).train_on(
-        &samples,
-        &settings.training,
-        seed,
-        checkpoints,
-        progress,
-    )?;
-    let stage = progress.stage("calibration", CALIBRATION);
-    let calibration = prior.rows(0..CALIBRATION as u64, seed, "calibration", &stage)?;
-    let mut estimator = Estimator {
-        project: project.clone(),
-        preset: options.preset,
-        settings,
-        recipe: preset.features.clone(),
-        architecture: preset.architecture.clone(),
-        readout: Readout {
-            inputs,
-            targets,
-            layer: None,
-            network,
-        },
-        calibration: Calibration {
-            predicted: Array2::zeros(calibration.theta.dim()),
-            truth: calibration.theta,
-        },
-        seed,
-    };
-    estimator.calibration.predicted = estimator.predict(&calibration.features)?;
-    Ok((estimator, history))
+
+    /// Rows of the bank; refuses one that is too large for the memory.
+    pub fn size_in_memory(&self) -> Result<usize, EstimatorError> {
+        match self.settings.bank_size {
+            size if size <= MOST_IN_MEMORY => Ok(size),
+            size => Err(EstimatorError::Bank(format!(
+                "bank size = {size}; at most {MOST_IN_MEMORY} fit into memory: make a bank on disk, then pretrain from it"
+            ))),
+        }
+    }
+
+    /// Trains the network on a bank of this study's prior and the preset's features; goes on with what was kept of the training.
+    ///
+    /// A bank of at most 64 MiB as 32-bit numbers gives, row for row, the estimator of [`pretrain`]; of a larger one, no more than
+    /// that is in memory at a time.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError`]; also for rows of another width.
+    pub fn train(
+        self,
+        bank: &dyn Bank,
+        checkpoints: &Checkpoints,
+        progress: &Progress,
+    ) -> Result<(Estimator, History), EstimatorError> {
+        let Self {
+            project,
+            options: PretrainOptions { preset, seed, .. },
+            settings,
+            prior,
+        } = self;
+        let recipe = project.recipe(preset);
+        let first = first_rows(bank)?;
+        let parameters = project.study().twin().parameters().len();
+        for (what, given, expected) in [
+            ("parameters", first.theta.ncols(), parameters),
+            ("features", first.features.ncols(), prior.dim()),
+        ] {
+            if given != expected {
+                return Err(EstimatorError::Bank(format!(
+                    "the bank has {given} {what}, twin and preset have {expected}; make a bank with this study and preset"
+                )));
+            }
+        }
+        let inputs = match settings.inputs {
+            Inputs::Each => Standardiser::each(&first.features),
+            Inputs::Principal => {
+                Standardiser::principal(&first.features, LIMIT).map_err(|error| {
+                    EstimatorError::Inputs(format!(
+                        "the features of the bank cannot be standardised: {error}"
+                    ))
+                })?
+            }
+        };
+        let targets = Scaler::fit(&first.theta);
+        let samples = Standardised {
+            bank,
+            inputs: &inputs,
+            targets: &targets,
+        };
+        let training = &settings.training;
+        let (network, history) =
+            (recipe.architecture).train_on(&samples, training, seed, checkpoints, progress)?;
+        let stage = progress.stage("calibration", CALIBRATION);
+        let Draws {
+            theta, features, ..
+        } = prior.rows(0..CALIBRATION as u64, seed, "calibration", &stage)?;
+        let mut estimator = Estimator {
+            project: project.clone(),
+            preset,
+            settings,
+            recipe: recipe.features.clone(),
+            architecture: recipe.architecture.clone(),
+            readout: Readout {
+                inputs,
+                targets,
+                layer: None,
+                network,
+            },
+            calibration: Calibration {
+                predicted: Array2::zeros(theta.dim()),
+                truth: theta,
+            },
+            seed,
+        };
+        estimator.calibration.predicted = estimator.predict(&features)?;
+        Ok((estimator, history))
+    }
 }
 
 /// The first [`STANDARD`] rows of a bank, or all: rows are alike, and so many tell means and deviations well enough.

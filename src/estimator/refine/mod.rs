@@ -25,13 +25,16 @@ pub use settings::RefineSettings;
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::gate::GateSettings;
-use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem, space_filling};
+use crate::fit::least_squares::{GaussNewton, ResidualProblem, space_filling};
 use crate::math::{MathError, Whitening};
-use crate::progress::Progress;
+use crate::progress::{Progress, Stage};
 use crate::record::Drive;
-use crate::twin::{Noise, ParameterSpace};
+use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 use problem::FeatureResidual;
+
+/// Largest move, in prior widths, of an estimate that rests.
+const AT_REST: f64 = 1e-3;
 
 /// The refined estimate, with what was simulated around it.
 #[derive(Debug, Clone)]
@@ -59,12 +62,8 @@ impl Refined {
 
     /// The part of a whitened residual that θ could still remove, ‖P_J r‖²: χ²_d at the true θ.
     pub fn explainable_misfit(&self, residual: &DVector<f64>) -> f64 {
-        let jacobian = self.whitened_jacobian();
-        jacobian
-            .clone()
-            .svd(true, false)
-            .u
-            .map_or(0.0, |u| u.tr_mul(residual).norm_squared())
+        let svd = self.whitened_jacobian().svd(true, false);
+        svd.u.map_or(0.0, |u| u.tr_mul(residual).norm_squared())
     }
 }
 
@@ -114,42 +113,79 @@ struct Local {
 impl Refinement<'_> {
     /// Runs it from `initial`.
     pub fn run(&self, initial: &[f64]) -> Result<Refined, EstimatorError> {
-        let space = self.simulator.twin().parameters();
         let settings = self.settings;
-        let stage = self
-            .progress
-            .stage("Gauss–Newton", settings.starts + settings.rounds);
-        let initial = DVector::from_vec(space.clamp(initial));
+        let steps = settings.starts + settings.rounds;
+        let stage = self.progress.stage("Gauss–Newton", steps);
+        let mut problem = self.problem(initial, settings.seeds);
+        let start = problem.initial.clone();
         let (theta, local) = match (settings.starts, settings.rounds) {
             // Nothing to choose from, and little way to go.
-            (1, 1) => (initial.clone(), self.whiten(&initial)?),
-            _ => self.survey(&space, &initial, &stage)?,
+            (1, 1) => (start.clone(), self.whiten(&start)?),
+            _ => self.survey(&start, &stage)?,
         };
-        let (theta, local) = self.polish(&space, &initial, theta, local, &stage)?;
+        let (theta, local) = self.polish(&mut problem, theta, local, &stage)?;
         stage.finish();
-        self.describe(&space, &initial, theta, local)
+        self.describe(&problem, theta, local)
     }
 
-    /// The best of several starts.
+    /// Returns information and directions at `theta` without a search.
+    pub fn describe_at(&self, theta: &[f64]) -> Result<Refined, EstimatorError> {
+        let problem = self.problem(theta, self.settings.seeds);
+        let theta = problem.initial.clone();
+        let local = self.whiten(&theta)?;
+        self.describe(&problem, theta, local)
+    }
+
+    /// S^{-1/2}(f̄(θ) − x_obs) with the covariance at θ_GN.
+    pub fn whitened_residual(
+        &self,
+        refined: &Refined,
+        theta: &[f64],
+    ) -> Result<DVector<f64>, EstimatorError> {
+        let problem = self.problem(refined.theta.as_slice(), self.settings.seeds);
+        let mean = problem
+            .mean_features(&DVector::from_column_slice(theta))
+            .map_err(not_evaluated)?;
+        Ok(refined.whitening.apply(&(mean - self.observed)))
+    }
+
+    /// ∂f/∂θ at `theta`, n × d, of a few seeds, each by itself.
+    pub fn jacobians_at(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, EstimatorError> {
+        let problem = self.problem(theta, self.settings.centred_seeds);
+        Ok((problem.jacobians(&problem.initial)).map_err(not_evaluated)?)
+    }
+
+    /// The residual that is pulled towards `initial`, with so many runs in each mean.
+    fn problem(&self, initial: &[f64], seeds: usize) -> FeatureResidual<'_> {
+        let space = self.simulator.twin().parameters();
+        let (widths, bounds) = (space.widths(), space.bounds());
+        FeatureResidual {
+            refinement: self,
+            seeds,
+            whitening: None,
+            initial: DVector::from_vec(space.clamp(initial)),
+            lower: bounds.iter().map(|b| b.low()).collect(),
+            upper: bounds.iter().map(|b| b.high()).collect(),
+            widths: DVector::from_vec(widths),
+        }
+    }
+
+    /// The best of several starts: θ_init, then space-filling points in the bounds.
     fn survey(
         &self,
-        space: &ParameterSpace,
         initial: &DVector<f64>,
-        stage: &crate::progress::Stage,
+        stage: &Stage,
     ) -> Result<(DVector<f64>, Local), EstimatorError> {
+        let mut problem = self.problem(initial.as_slice(), self.settings.survey_seeds);
+        let others = space_filling(&problem.bounds()?, self.settings.starts - 1, 0);
         let (mut best, mut last): (Option<Candidate>, _) = (None, String::new());
-        for start in starts(space, initial, self.settings.starts)? {
-            let survey = self.problem(space, initial, self.settings.survey_seeds);
-            match self.climb(survey, &start, space) {
-                Ok(candidate) => {
-                    // Ties and equals go to the earlier start: θ_init comes first.
-                    if best
-                        .as_ref()
-                        .is_none_or(|best| candidate.score > best.score)
-                    {
-                        best = Some(candidate);
-                    }
+        for start in [initial.clone()].into_iter().chain(others) {
+            match self.climb(&mut problem, &start) {
+                // Ties and equals go to the earlier start: θ_init comes first.
+                Ok(found) if best.as_ref().is_none_or(|best| found.score > best.score) => {
+                    best = Some(found);
                 }
+                Ok(_) => {}
                 Err(error) if is_fatal(&error) => return Err(error),
                 Err(error) => last = error.to_string(),
             }
@@ -164,111 +200,20 @@ impl Refinement<'_> {
         Ok((theta, local))
     }
 
-    /// S^{-1/2}(f̄(θ) − x_obs) with the covariance at θ_GN.
-    pub fn whitened_residual(
-        &self,
-        refined: &Refined,
-        theta: &[f64],
-    ) -> Result<DVector<f64>, EstimatorError> {
-        let space = self.simulator.twin().parameters();
-        let problem = self.problem(&space, &refined.theta, self.settings.seeds);
-        let mean = problem
-            .mean_features(&DVector::from_column_slice(theta))
-            .map_err(not_evaluated)?;
-        Ok(refined.whitening.apply(&(mean - self.observed)))
-    }
-
-    fn problem(
-        &self,
-        space: &ParameterSpace,
-        initial: &DVector<f64>,
-        seeds: usize,
-    ) -> FeatureResidual<'_> {
-        let bounds = space.bounds();
-        let side = |of: fn(crate::twin::Interval) -> f64| bounds.iter().map(|b| of(*b)).collect();
-        FeatureResidual {
-            simulator: self.simulator,
-            drive: self.drive,
-            observed: self.observed,
-            noise: self.noise.child("mean features"),
-            progress: self.progress,
-            seeds,
-            whitening: None,
-            pull: self.settings.pull.sqrt(),
-            initial: initial.clone(),
-            widths: DVector::from_vec(space.widths()),
-            steps: space
-                .widths()
-                .iter()
-                .map(|w| self.settings.step * w)
-                .collect(),
-            lower: side(crate::twin::Interval::low),
-            upper: side(crate::twin::Interval::high),
-        }
-    }
-
-    /// ∂f/∂θ at `theta`, n × d, of a few seeds, each by itself.
-    pub fn jacobians_at(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, EstimatorError> {
-        let space = self.simulator.twin().parameters();
-        let theta = DVector::from_vec(space.clamp(theta));
-        let problem = self.problem(&space, &theta, self.settings.centred_seeds);
-        Ok(problem.jacobians(&theta).map_err(not_evaluated)?)
-    }
-
-    /// Returns information and directions at `theta` without a search.
-    pub fn describe_at(&self, theta: &[f64]) -> Result<Refined, EstimatorError> {
-        let space = self.simulator.twin().parameters();
-        let theta = DVector::from_vec(space.clamp(theta));
-        let local = self.whiten(&theta)?;
-        self.describe(&space, &theta.clone(), theta, local)
-    }
-
-    /// S at `theta`, from the same noise everywhere.
-    fn whiten(&self, theta: &DVector<f64>) -> Result<Local, EstimatorError> {
-        let size = self.gate.whitening_simulations(self.simulator.dim());
-        let noise = self.noise.child("whitening");
-        let features = self.simulator.repeat(
-            theta.as_slice(),
-            self.drive,
-            size,
-            |i| noise.sample(i),
-            &self.progress.unshown().stage("whitening", 0),
-        )?;
-        let whitening = self.gate.whiten(&features)?;
-        let spread = (whitening.squared_distances(&features).iter())
-            .map(|s| s.sqrt())
-            .collect();
-        Ok(Local { whitening, spread })
-    }
-
-    fn minimiser(&self) -> GaussNewton {
-        GaussNewton {
-            max_iterations: self.settings.iterations,
-            relative_cutoff: self.settings.cutoff,
-            tolerance: 1e-6,
-            step_tolerance: 1e-5,
-            // A step over half the prior's width leaves what the Jacobian knows.
-            max_step: Some(0.5),
-        }
-    }
-
     /// One start: whiten there, descend, whiten at the end, score.
     fn climb(
         &self,
-        mut problem: FeatureResidual<'_>,
+        problem: &mut FeatureResidual<'_>,
         start: &DVector<f64>,
-        space: &ParameterSpace,
     ) -> Result<Candidate, EstimatorError> {
         problem.whitening = Some(self.whiten(start)?.whitening);
-        let minimum =
-            self.minimiser()
-                .minimise(&problem, start, &bounds(space)?, &problem.widths)?;
-        let local = self.whiten(&minimum.theta)?;
+        let theta = self.descend(problem, start)?;
+        let local = self.whiten(&theta)?;
         problem.whitening = Some(local.whitening.clone());
-        let residual = problem.residual(&minimum.theta).map_err(not_evaluated)?;
+        let residual = problem.residual(&theta).map_err(not_evaluated)?;
         Ok(Candidate {
             score: -0.5 * (residual.norm_squared() + local.whitening.log_determinant()),
-            theta: minimum.theta,
+            theta,
             local,
         })
     }
@@ -276,49 +221,72 @@ impl Refinement<'_> {
     /// Descends on from the best start with all seeds, simulating S again until θ rests.
     fn polish(
         &self,
-        space: &ParameterSpace,
-        initial: &DVector<f64>,
+        problem: &mut FeatureResidual<'_>,
         mut theta: DVector<f64>,
         mut local: Local,
-        stage: &crate::progress::Stage,
+        stage: &Stage,
     ) -> Result<(DVector<f64>, Local), EstimatorError> {
-        let mut problem = self.problem(space, initial, self.settings.seeds);
         for _ in 0..self.settings.rounds {
             problem.whitening = Some(local.whitening.clone());
-            let minimum =
-                self.minimiser()
-                    .minimise(&problem, &theta, &bounds(space)?, &problem.widths)?;
-            let moved = (&minimum.theta - &theta)
-                .component_div(&problem.widths)
-                .amax();
-            theta = minimum.theta;
+            let next = self.descend(problem, &theta)?;
+            let moved = (&next - &theta).component_div(&problem.widths).amax();
+            theta = next;
             // A single round stays so near that S does.
             if self.settings.rounds > 1 {
                 local = self.whiten(&theta)?;
             }
             stage.tick()?;
-            if moved < 1e-3 {
+            if moved < AT_REST {
                 break;
             }
         }
         Ok((theta, local))
     }
 
+    fn descend(
+        &self,
+        problem: &FeatureResidual<'_>,
+        start: &DVector<f64>,
+    ) -> Result<DVector<f64>, MathError> {
+        let search = GaussNewton {
+            max_iterations: self.settings.iterations,
+            relative_cutoff: self.settings.cutoff,
+            tolerance: 1e-6,
+            step_tolerance: 1e-5,
+            // A step over half the prior's width leaves what the Jacobian knows.
+            max_step: Some(0.5),
+        };
+        let bounds = problem.bounds()?;
+        Ok((search.minimise(problem, start, &bounds, &problem.widths)?).theta)
+    }
+
+    /// S at `theta`, from the same noise everywhere.
+    fn whiten(&self, theta: &DVector<f64>) -> Result<Local, EstimatorError> {
+        let size = self.gate.whitening_simulations(self.simulator.dim());
+        let noise = self.noise.child("whitening");
+        let stage = self.progress.unshown().stage("whitening", 0);
+        let sample = |i| noise.sample(i);
+        let features =
+            (self.simulator).repeat(theta.as_slice(), self.drive, size, sample, &stage)?;
+        let whitening = self.gate.whiten(&features)?;
+        let squares = whitening.squared_distances(&features);
+        let spread = squares.iter().map(|s| s.sqrt()).collect();
+        Ok(Local { whitening, spread })
+    }
+
     /// Everything around the estimate.
     fn describe(
         &self,
-        space: &ParameterSpace,
-        initial: &DVector<f64>,
+        problem: &FeatureResidual<'_>,
         theta: DVector<f64>,
         Local { whitening, spread }: Local,
     ) -> Result<Refined, EstimatorError> {
-        let problem = self.problem(space, initial, self.settings.seeds);
         let jacobian = problem.feature_jacobian(&theta).map_err(not_evaluated)?;
         let mean = problem.mean_features(&theta).map_err(not_evaluated)?;
         let residual = whitening.apply(&(mean - self.observed));
         let information = Information::new(
             &whitening.apply_columns(&jacobian),
-            space,
+            &self.simulator.twin().parameters(),
             self.settings.ridge,
             self.settings.seeds,
         )?;
@@ -340,26 +308,4 @@ fn not_evaluated(error: MathError) -> MathError {
         MathError::Rejected(_) => MathError::Start(error.into()),
         other => MathError::fatal(other),
     }
-}
-
-/// The bounds of a space, as the minimiser wants them.
-fn bounds(space: &ParameterSpace) -> Result<Bounds, MathError> {
-    let side = |of: fn(crate::twin::Interval) -> f64| {
-        DVector::from_iterator(space.len(), space.bounds().into_iter().map(of))
-    };
-    Bounds::new(
-        side(crate::twin::Interval::low),
-        side(crate::twin::Interval::high),
-    )
-}
-
-/// θ_init, then space-filling points in the bounds.
-fn starts(
-    space: &ParameterSpace,
-    initial: &DVector<f64>,
-    count: usize,
-) -> Result<Vec<DVector<f64>>, EstimatorError> {
-    let mut all = vec![initial.clone()];
-    all.extend(space_filling(&bounds(space)?, count - 1, 0));
-    Ok(all)
 }

@@ -1,30 +1,24 @@
 //! The residual that Gauss–Newton makes small, and its Jacobian by paired differences.
 
-use crate::estimator::bank::FeatureSimulator;
+use super::Refinement;
 use crate::estimator::error::EstimatorError;
-use crate::fit::least_squares::ResidualProblem;
+use crate::fit::least_squares::{Bounds, ResidualProblem};
 use crate::math::{MathError, Stencil, Whitening};
-use crate::progress::Progress;
-use crate::record::Drive;
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// r(θ) = [ S^{-1/2}(f̄(θ) − x_obs) ;  √γ·(θ − θ_init)/width ].
 pub(super) struct FeatureResidual<'a> {
-    pub simulator: &'a FeatureSimulator,
-    pub drive: &'a Drive,
-    pub observed: &'a DVector<f64>,
-    pub noise: Noise,
-    pub progress: &'a Progress,
+    pub refinement: &'a Refinement<'a>,
+    /// Runs that f̄ averages.
     pub seeds: usize,
     /// Set before the residual is asked for.
     pub whitening: Option<Whitening>,
-    /// √γ.
-    pub pull: f64,
+    /// θ_init.
     pub initial: DVector<f64>,
+    /// Widths of the prior.
     pub widths: DVector<f64>,
-    pub steps: Vec<f64>,
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
 }
@@ -39,27 +33,52 @@ impl From<EstimatorError> for MathError {
 }
 
 impl FeatureResidual<'_> {
+    /// Bounds of θ, as the search takes them.
+    pub fn bounds(&self) -> Result<Bounds, MathError> {
+        let [lower, upper] =
+            [&self.lower, &self.upper].map(|side| DVector::from_column_slice(side));
+        Bounds::new(lower, upper)
+    }
+
+    fn noise(&self) -> Noise {
+        self.refinement.noise.child("mean features")
+    }
+
     /// f̄(θ).
     pub fn mean_features(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
-        self.progress.checkpoint().map_err(MathError::fatal)?;
-        let noise = |i| self.noise.sample(i);
-        let mean =
-            (self.simulator).mean_features(theta.as_slice(), self.drive, noise, self.seeds)?;
-        Ok(mean)
+        let Refinement {
+            simulator,
+            drive,
+            progress,
+            ..
+        } = self.refinement;
+        progress.checkpoint().map_err(MathError::fatal)?;
+        let noise = self.noise();
+        let sample = |i| noise.sample(i);
+        Ok(simulator.mean_features(theta.as_slice(), drive, sample, self.seeds)?)
+    }
+
+    fn stencil(&self, theta: &DVector<f64>) -> Result<Stencil, MathError> {
+        let steps = &self.widths * self.refinement.settings.step;
+        let (lower, upper) = (&self.lower, &self.upper);
+        Stencil::new(theta.as_slice(), steps.as_slice(), lower, upper)
     }
 
     /// ∂f/∂θ of each seed by itself.
     pub fn jacobians(&self, theta: &DVector<f64>) -> Result<Vec<DMatrix<f64>>, MathError> {
-        let stencil = Stencil::new(theta.as_slice(), &self.steps, &self.lower, &self.upper)?;
+        let (stencil, noise) = (self.stencil(theta)?, self.noise());
+        let &Refinement {
+            simulator,
+            drive,
+            progress,
+            ..
+        } = self.refinement;
         let one = |seed: u64| {
-            self.progress.checkpoint().map_err(MathError::fatal)?;
-            let points = stencil.points();
-            let noise = self.noise.sample(seed);
-            let all: Vec<_> = (points.iter())
-                .map(|point| (&point[..], self.drive, noise))
+            progress.checkpoint().map_err(MathError::fatal)?;
+            let all: Vec<_> = (stencil.points().iter())
+                .map(|point| (&point[..], drive, noise.sample(seed)))
                 .collect();
-            let found = self.simulator.features(&all).into_iter();
-            let values: Vec<DVector<f64>> = found
+            let values: Vec<DVector<f64>> = (simulator.features(&all).into_iter())
                 .map(|features| Ok(DVector::from_vec(features?)))
                 .collect::<Result<_, EstimatorError>>()?;
             Ok(stencil.assemble(&values))
@@ -69,11 +88,16 @@ impl FeatureResidual<'_> {
 
     /// ∂f̄/∂θ: the same seeds on both sides of θ.
     pub fn feature_jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
-        let stencil = Stencil::new(theta.as_slice(), &self.steps, &self.lower, &self.upper)?;
+        let stencil = self.stencil(theta)?;
         let values: Vec<DVector<f64>> = (stencil.points().par_iter())
             .map(|point| self.mean_features(&DVector::from_column_slice(point)))
             .collect::<Result<_, _>>()?;
         Ok(stencil.assemble(&values))
+    }
+
+    /// √γ.
+    fn pull(&self) -> f64 {
+        self.refinement.settings.pull.sqrt()
     }
 
     fn whitening(&self) -> Result<&Whitening, MathError> {
@@ -89,8 +113,8 @@ impl ResidualProblem for FeatureResidual<'_> {
     fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
         let misfit = self
             .whitening()?
-            .apply(&(self.mean_features(theta)? - self.observed));
-        let prior = (theta - &self.initial).component_div(&self.widths) * self.pull;
+            .apply(&(self.mean_features(theta)? - self.refinement.observed));
+        let prior = (theta - &self.initial).component_div(&self.widths) * self.pull();
         let rows = misfit.iter().chain(prior.iter()).copied();
         Ok(DVector::from_iterator(misfit.len() + prior.len(), rows))
     }
@@ -102,7 +126,7 @@ impl ResidualProblem for FeatureResidual<'_> {
         let (n, d) = whitened.shape();
         let mut all = whitened.resize_vertically(n + d, 0.0);
         for j in 0..d {
-            all[(n + j, j)] = self.pull / self.widths[j];
+            all[(n + j, j)] = self.pull() / self.widths[j];
         }
         Ok(all)
     }

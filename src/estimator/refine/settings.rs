@@ -76,33 +76,31 @@ impl RefineSettings {
 
     /// Checks whether each field is in its range.
     pub fn check(&self) -> Result<(), SettingError> {
-        let counts = [
+        let unless = |valid: bool, field: &str, value: f64, remedy: &str| {
+            SettingError::unless(valid, format!("refine: {field}"), value, remedy)
+        };
+        for (field, count) in [
             ("starts", self.starts),
             ("rounds", self.rounds),
             ("iterations", self.iterations as usize),
             ("seeds", self.seeds),
             ("centred_seeds", self.centred_seeds),
             ("survey_seeds", self.survey_seeds),
-        ];
-        let refuse = |field: &str, value: f64, remedy: &str| {
-            Err(SettingError::new(format!("refine: {field}"), value, remedy))
-        };
-        for (field, value) in counts {
-            if value == 0 {
-                return refuse(field, 0.0, "at least 1 is needed");
-            }
+        ] {
+            unless(count > 0, field, 0.0, "at least 1 is needed")?;
         }
         for (field, value) in [("pull", self.pull), ("ridge", self.ridge)] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return refuse(field, value, "must be 0 or more");
-            }
+            let valid = value >= 0.0 && value.is_finite();
+            unless(valid, field, value, "must be 0 or more")?;
         }
-        if !(self.step > 0.0 && self.step < 1.0) {
-            return refuse("step", self.step, "must lie between 0 and 1 prior widths");
-        }
-        if !(0.0..1.0).contains(&self.cutoff) {
-            return refuse("cutoff", self.cutoff, "must lie in [0, 1)");
-        }
-        Ok(())
+        let remedy = "must lie between 0 and 1 prior widths";
+        unless(
+            self.step > 0.0 && self.step < 1.0,
+            "step",
+            self.step,
+            remedy,
+        )?;
+        let valid = (0.0..1.0).contains(&self.cutoff);
+        unless(valid, "cutoff", self.cutoff, "must lie in [0, 1)")
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::estimator::bank::{Bank, Draws, file};
 use crate::estimator::error::EstimatorError;
+use crate::estimator::settings::MOST_SIMULATIONS;
 use crate::storage::StorageError;
 use crate::storage::files::{sha256, write_new};
 use crate::storage::untrusted::{MOST_NUMBERS, read_kept};
@@ -15,8 +16,6 @@ use std::path::{Path, PathBuf};
 
 /// Verb whose folders hold banks.
 pub(super) const VERB: &str = "bank";
-/// Most simulations of a bank.
-pub(super) const MOST: usize = 1_000_000_000_000;
 /// About so many shards make a bank, unless they would be smaller or larger than this.
 const SHARES: usize = 64;
 const FEWEST_ROWS: usize = 16;
@@ -77,7 +76,7 @@ impl Shards {
             return Err(foreign(folder.path()).into());
         };
         // Everything below counts shards: no manifest may make it count without end.
-        if size > MOST || rows != rows_of_a_shard(size) {
+        if size > MOST_SIMULATIONS || rows != rows_of_a_shard(size) {
             return Err(foreign(folder.path()).into());
         }
         let of = size.div_ceil(rows);

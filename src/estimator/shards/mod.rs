@@ -10,7 +10,6 @@
 //!
 //! | to … | look at |
 //! |---|---|
-//! | simulate from a study's prior | [`Prior`] |
 //! | fill a folder, or a share of it | [`BankPlan::fill`] |
 //! | put the folders of a job array together | [`merge`] |
 //! | train on more than fits into memory | [`ShardedBank`], a [`Bank`](crate::estimator::bank::Bank) |
@@ -18,11 +17,9 @@
 mod folder;
 mod merge;
 mod plan;
-mod prior;
 #[cfg(test)]
 pub(super) mod tests;
 
 pub use folder::ShardedBank;
 pub use merge::{merge, merge_into_file};
 pub use plan::BankPlan;
-pub use prior::Prior;

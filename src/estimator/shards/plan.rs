@@ -1,11 +1,12 @@
 //! Plan of a bank on disk.
 
-use super::folder::{MOST, SHARDS, ShardedBank, Shards, VERB, rows_of_a_shard};
-use super::prior::Prior;
+use super::folder::{SHARDS, ShardedBank, Shards, VERB, rows_of_a_shard};
+use crate::estimator::bank::Prior;
 use crate::estimator::bank::file::npz;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::project::Project;
 use crate::estimator::recipe::PresetName;
+use crate::estimator::settings::MOST_SIMULATIONS;
 use crate::progress::Progress;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use serde_json::json;
@@ -50,9 +51,9 @@ impl BankPlan {
         share: Share,
         progress: &Progress,
     ) -> Result<Filled, EstimatorError> {
-        if !(1..=MOST).contains(&self.size) {
+        if !(1..=MOST_SIMULATIONS).contains(&self.size) {
             return Err(EstimatorError::Bank(format!(
-                "a bank of {} simulations; choose between 1 and {MOST}",
+                "a bank of {} simulations; choose between 1 and {MOST_SIMULATIONS}",
                 self.size
             )));
         }

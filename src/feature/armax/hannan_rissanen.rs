@@ -121,10 +121,7 @@ impl<'a> Series<'a> {
         let mut innovations = vec![0.0; long];
         innovations.extend(fit.residual.iter());
         let mut signals = lagged(self.y, p, self.inputs, q);
-        signals.push(Lagged {
-            values: innovations,
-            lags: r,
-        });
+        signals.push(Lagged::new(innovations, r));
         let fit = regress(signals, long + r)?;
         let mut theta = fit.coefficients.as_slice().to_vec();
         make_invertible(&mut theta[self.orders.coefficients() - r..]);
@@ -180,12 +177,11 @@ impl<'a> Series<'a> {
 
 /// The output with p lags, each input with q.
 fn lagged(y: &[f64], p: usize, inputs: &[Vec<f64>], q: usize) -> Vec<Lagged> {
-    let lagged = |values: &[f64], lags| Lagged {
-        values: values.to_vec(),
-        lags,
-    };
-    let inputs = inputs.iter().map(|u| lagged(u, q));
-    [lagged(y, p)].into_iter().chain(inputs).collect()
+    let inputs = inputs.iter().map(|u| Lagged::new(u.clone(), q));
+    [Lagged::new(y.to_vec(), p)]
+        .into_iter()
+        .chain(inputs)
+        .collect()
 }
 
 fn sum_of_squares(x: &[f64]) -> f64 {

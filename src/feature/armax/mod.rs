@@ -2,7 +2,7 @@
 
 mod hannan_rissanen;
 
-use super::{FeatureError, FeatureMap, FeatureRecipe, check_varies};
+use super::{FeatureError, FeatureMap, FeatureRecipe, check_long, check_varies};
 use crate::record::{Drive, Signal};
 use crate::twin::Twin;
 use hannan_rissanen::{Model, Orders, estimate};
@@ -46,10 +46,7 @@ pub struct Armax {
 #[typetag::serde(name = "armax")]
 impl FeatureRecipe for Armax {
     fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
-        let refuse = |problem: String| {
-            let kind = "armax";
-            Err(FeatureError::Setting { kind, problem })
-        };
+        let refuse = |problem| Err(FeatureError::setting("armax", problem));
         let Self {
             outputs: p,
             inputs: q,
@@ -67,28 +64,25 @@ impl FeatureRecipe for Armax {
             ));
         }
         let inputs = if q > 0 { signals.inputs.len() } else { 0 };
-        Ok(Arc::new(Bound {
+        Ok(Arc::new(ArmaxMap {
             orders: Orders { p, q, r, inputs },
             outputs: signals.outputs.len(),
         }))
     }
 }
 
-struct Bound {
+struct ArmaxMap {
     orders: Orders,
     outputs: usize,
 }
 
-impl FeatureMap for Bound {
+impl FeatureMap for ArmaxMap {
     fn dim(&self) -> usize {
         self.outputs * (self.orders.coefficients() + 1)
     }
 
     fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
-        let (samples, needed) = (outputs.nrows(), self.orders.needed());
-        if samples < needed {
-            return Err(FeatureError::TooShort { samples, needed });
-        }
+        check_long(outputs.nrows(), self.orders.needed())?;
         check_varies(outputs)?;
         let inputs: Vec<Vec<f64>> = (drive.inputs().columns().into_iter())
             .take(self.orders.inputs)

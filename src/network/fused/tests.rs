@@ -1,5 +1,6 @@
+//! Fused layers against plain ones, and their parts.
+
 use super::*;
-use crate::network::Leaky;
 use dfdx::nn::modules;
 
 const ROWS: usize = 7;
@@ -126,4 +127,82 @@ fn an_input_that_is_not_contiguous_is_read_in_its_order() {
     let view: Batch<Const<21>> = turned.permute();
     let copy: Batch<Const<21>> = device.tensor_from_vec(view.as_vec(), (ROWS, Const));
     assert_eq!(fused.forward(view).as_vec(), fused.forward(copy).as_vec());
+}
+
+fn dropped(rows: usize, outputs: usize, probability: f32, seed: u64) -> Vec<f32> {
+    let mut z = vec![1.0; rows * outputs];
+    let mask = Mask { probability, seed };
+    forward::<ReLU>(&mut z, &vec![0.0; outputs], None, Some(mask));
+    z
+}
+
+#[test]
+fn dropout_has_its_rate_and_keeps_the_mean() {
+    for p in [0.1f32, 0.15, 0.5] {
+        let out = dropped(1000, 200, p, 7);
+        let n = out.len() as f64;
+        let zeros = out.iter().filter(|v| **v == 0.0).count() as f64;
+        let sigma = (n * f64::from(p) * f64::from(1.0 - p)).sqrt();
+        assert!(
+            (zeros - n * f64::from(p)).abs() < 4.0 * sigma,
+            "{p}: {zeros}"
+        );
+        let kept = 1.0 / (1.0 - p);
+        assert!(out.iter().all(|v| *v == 0.0 || *v == kept));
+    }
+}
+
+#[test]
+fn neighbours_in_row_column_and_seed_are_dropped_independently() {
+    let (rows, outputs) = (400, 256);
+    let a = dropped(rows, outputs, 0.5, 1 << 40);
+    let b = dropped(rows, outputs, 0.5, (1 << 40) + 1);
+    assert_eq!(a, dropped(rows, outputs, 0.5, 1 << 40));
+    let agreement = |x: &[f32], y: &[f32]| {
+        x.iter().zip(y).filter(|(x, y)| x == y).count() as f64 / y.len() as f64
+    };
+    // One standard deviation of an agreement is 0.0016.
+    for (what, share) in [
+        ("seed", agreement(&a, &b)),
+        ("row", agreement(&a, &a[outputs..])),
+        ("column", agreement(&a, &a[1..])),
+    ] {
+        assert!((share - 0.5).abs() < 0.008, "{what}: {share}");
+    }
+}
+
+#[test]
+fn rows_are_normalised() {
+    let (gamma, beta) = (vec![1.0; 37], vec![0.0; 37]);
+    let mut z: Vec<f32> = (0..74).map(|i| (i * i % 23) as f32).collect();
+    let saved = forward::<ReLU>(&mut z, &[0.5; 37], Some([&gamma, &beta]), None);
+    for row in saved.normalised.chunks_exact(37) {
+        let mean: f32 = row.iter().sum::<f32>() / 37.0;
+        let square: f32 = row.iter().map(|v| v * v).sum::<f32>() / 37.0;
+        assert!(mean.abs() < 1e-5 && (square - 1.0).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn the_fast_tanh_is_tanh() {
+    let worst = (-120_000..=120_000)
+        .map(|i| i as f32 * 1e-4)
+        .map(|z| (<Tanh as Activation>::value(z) - (z as f64).tanh() as f32).abs())
+        .fold(0.0, f32::max);
+    assert!(worst < 5e-7, "{worst}");
+    assert!(<Tanh as Activation>::value(f32::NAN).is_nan());
+}
+
+#[test]
+fn slopes_are_derivatives() {
+    fn check<A: Activation>() {
+        for z in [-2.0f32, -0.3, 0.4, 1.5] {
+            let h = 1e-2;
+            let measured = (A::value(z + h) - A::value(z - h)) / (2.0 * h);
+            assert!((A::slope(A::value(z)) - measured).abs() < 1e-3, "{z}");
+        }
+    }
+    check::<ReLU>();
+    check::<Leaky>();
+    check::<Tanh>();
 }

@@ -1,7 +1,11 @@
-//! A quadratic map from features to parameters, fitted by ridge regression.
+//! The quadratic layer beside the heads: a quadratic map from features to parameters, fitted by ridge regression.
 
+use super::Scaler;
 use crate::math::{to_array, to_matrix};
-use ndarray::{Array2, Axis, concatenate};
+use ndarray::{Array2, Axis, aview1, concatenate};
+
+/// Weight of a row of zeros in the ridge regression of the quadratic layer.
+const RIDGE: f64 = 1.0;
 
 /// ŷ = B·[1, z, s⊗s], where s = A·[1, z] is the best linear estimate of the targets; n features, d targets.
 ///
@@ -11,7 +15,7 @@ use ndarray::{Array2, Axis, concatenate};
 /// Source: Beaumont, Zhang & Balding, "Approximate Bayesian computation in population genetics", *Genetics* 162 (2002), for
 /// regression on a cloud of simulations.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Quadratic {
+pub(in crate::estimator) struct Quadratic {
     /// A, (1 + n) × d.
     linear: Array2<f64>,
     /// B, (1 + n + d(d + 1)/2) × d.
@@ -63,10 +67,69 @@ fn regress(terms: &Array2<f64>, targets: &Array2<f64>, ridge: f64) -> Option<Arr
     finite.then(|| to_array(&solution))
 }
 
+/// The quadratic layer. The network learns its residuals: where q is nearly right, the network need not learn it anew.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuadraticLayer {
+    pub(in crate::estimator) quadratic: Quadratic,
+    /// r, for each target.
+    pub residual: Vec<f64>,
+    /// α, for each target.
+    pub weight: Vec<f64>,
+}
+
+impl QuadraticLayer {
+    /// Fits inputs z to standardised targets; `None` where numbers are not finite.
+    pub fn fit(z: &Array2<f64>, targets: &Array2<f64>) -> Option<Self> {
+        let quadratic = Quadratic::fit(z, targets, RIDGE)?;
+        Some(Self {
+            residual: Scaler::fit(&(targets - &quadratic.predict(z))).scale,
+            weight: vec![1.0; targets.ncols()],
+            quadratic,
+        })
+    }
+
+    /// y, from what the network says.
+    pub(super) fn join(&self, z: &Array2<f64>, said: &Array2<f64>) -> Array2<f64> {
+        let unit = &aview1(&self.weight) * &aview1(&self.residual);
+        self.quadratic.predict(z) + said * &unit
+    }
+
+    /// Returns the residuals of q, in units r: the network's targets.
+    pub fn rest(&self, z: &Array2<f64>, targets: &Array2<f64>) -> Array2<f64> {
+        (targets - &self.quadratic.predict(z)) / aview1(&self.residual)
+    }
+
+    /// Sets α by least squares on draws that the network never saw, within [0, 1]: where it has nothing to add, the
+    /// quadratic map stays as it is.
+    pub fn weigh(&mut self, rest: &Array2<f64>, said: &Array2<f64>) {
+        for (j, weight) in self.weight.iter_mut().enumerate() {
+            let (said, rest) = (said.column(j), rest.column(j));
+            let alpha = said.dot(&rest) / said.dot(&said);
+            *weight = if alpha.is_finite() {
+                alpha.clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::twin::Noise;
+
+    /// α is the share of what the network says that holds on draws it never saw.
+    #[test]
+    fn the_network_is_trusted_as_far_as_it_is_right() {
+        let z = Array2::from_shape_fn((50, 1), |(i, _)| (i as f64 - 24.5) / 15.0);
+        let mut layer = QuadraticLayer::fit(&z, &z).unwrap();
+        let rest = Array2::from_shape_fn((50, 1), |(i, _)| if i % 2 == 0 { 1.0 } else { -1.0 });
+        for (said, expected) in [(2.0, 0.5), (0.5, 1.0), (-1.0, 0.0), (0.0, 0.0)] {
+            layer.weigh(&rest, &(&rest * said));
+            assert_eq!(layer.weight, [expected], "{said}");
+        }
+    }
 
     fn inputs(rows: usize) -> Array2<f64> {
         let mut source = Noise::new(1, "quadratic", 0).source("z");

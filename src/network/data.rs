@@ -1,28 +1,106 @@
-//! From parts to the blocks of an epoch: what is in memory, in which order, and what is held out.
+//! Training data: samples in parts, the blocks of an epoch, and the seeds that order them.
 
 use super::NetworkError;
-use super::rows::Rows;
-use super::seed::{Purpose, derive};
+use crate::twin::mix;
+use ndarray::{Array2, Axis};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use std::borrow::Cow;
+use std::error::Error;
 
 /// Most bytes of a block of several parts; one part is never divided.
 const BLOCK: usize = 64 << 20;
 
+/// Features (rows × n) and targets (rows × d) of one part.
+pub type Part<'a> = (Cow<'a, Array2<f64>>, Cow<'a, Array2<f64>>);
+
+/// Rows of features and targets, both standardised, that need not fit into memory at once: they come in parts.
+///
+/// Rows are independent of each other and alike, so that any parts are a sample of the whole.
+pub trait Samples: Sync {
+    /// Features of a row, n.
+    fn features(&self) -> usize;
+
+    /// Targets of a row, d.
+    fn targets(&self) -> usize;
+
+    /// Rows of each part, in order.
+    fn parts(&self) -> Vec<usize>;
+
+    /// Part number `index`; it is asked for once an epoch.
+    fn part(&self, index: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>>;
+}
+
+/// Samples in memory.
+impl Samples for (&Array2<f64>, &Array2<f64>) {
+    fn features(&self) -> usize {
+        self.0.ncols()
+    }
+
+    fn targets(&self) -> usize {
+        self.1.ncols()
+    }
+
+    fn parts(&self) -> Vec<usize> {
+        vec![self.0.nrows()]
+    }
+
+    fn part(&self, _: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>> {
+        Ok((Cow::Borrowed(self.0), Cow::Borrowed(self.1)))
+    }
+}
+
+/// Use of a number drawn from the seed of a training; each has draws of its own.
+#[derive(Clone, Copy)]
+pub(super) enum Purpose {
+    Weights,
+    Split,
+    Shuffle,
+    Dropout,
+}
+
+/// Derives a seed for `purpose` and `counter`, which may be the epoch or the step.
+pub(super) fn derive(seed: u64, purpose: Purpose, counter: u64) -> u64 {
+    // The seed is mixed, too, lest neighbouring seeds meet at neighbouring counters.
+    mix(mix(mix(seed) ^ purpose as u64) ^ counter)
+}
+
+/// Converts a matrix to 32 bits, each row filled up with zeros to `width`; refuses what is not finite.
+pub(super) fn padded(
+    what: &'static str,
+    matrix: &Array2<f64>,
+    width: usize,
+) -> Result<Array2<f32>, NetworkError> {
+    let mut rows = Array2::zeros((matrix.nrows(), width));
+    for (row, (mut to, from)) in rows.rows_mut().into_iter().zip(matrix.rows()).enumerate() {
+        for (column, (to, &value)) in to.iter_mut().zip(from).enumerate() {
+            *to = value as f32;
+            if !to.is_finite() {
+                return Err(NetworkError::NotFinite {
+                    what,
+                    row,
+                    column,
+                    value,
+                });
+            }
+        }
+    }
+    Ok(rows)
+}
+
+/// The rows with these indices, one after another.
+pub(super) fn gathered(rows: &Array2<f32>, indices: &[usize]) -> Vec<f32> {
+    let mut all = Vec::with_capacity(indices.len() * rows.ncols());
+    indices.iter().for_each(|&i| all.extend(rows.row(i)));
+    all
+}
+
 /// Samples to learn from: one row of features and one of targets each.
 #[derive(Debug, Clone)]
 pub(super) struct Data {
-    pub features: Rows,
-    pub targets: Rows,
-}
-
-impl Data {
-    fn append(&mut self, other: Self) {
-        self.features.append(other.features);
-        self.targets.append(other.targets);
-    }
+    pub features: Array2<f32>,
+    pub targets: Array2<f32>,
 }
 
 /// Reads a part.
@@ -33,14 +111,19 @@ pub(super) type Read<'a> = dyn Fn(usize) -> Result<Data, NetworkError> + 'a;
 /// Where all parts together fit into a block they are read once: rows are held out at random, and each epoch has all other
 /// rows in an order of its own. Otherwise the last parts are held out, and each epoch puts the other parts in an order of its
 /// own, reads as many at a time as fit into a block, and orders the rows within.
-pub(super) enum Feed<'a> {
-    Whole {
+pub(super) struct Feed<'a> {
+    read: &'a Read<'a>,
+    seed: u64,
+    rows: Rows,
+}
+
+enum Rows {
+    InMemory {
         data: Data,
         training: Vec<usize>,
         held_out: Data,
     },
     Streamed {
-        read: &'a Read<'a>,
         /// Rows of each part.
         sizes: Vec<usize>,
         /// Parts before this one are trained on, the others are held out.
@@ -76,55 +159,55 @@ impl<'a> Feed<'a> {
         share: f64,
         seed: u64,
     ) -> Result<Self, NetworkError> {
-        let rows: usize = sizes.iter().sum();
-        if sizes.len() < 2 || rows <= most {
+        let count: usize = sizes.iter().sum();
+        let rows = if sizes.len() < 2 || count <= most {
             let data = together(read, 0..sizes.len())?;
-            let (training, held_out) = split(rows, share, seed)?;
+            let (training, held_out) = split(count, share, seed)?;
             let held_out = Data {
-                features: data.features.select(&held_out),
-                targets: data.targets.select(&held_out),
+                features: data.features.select(Axis(0), &held_out),
+                targets: data.targets.select(Axis(0), &held_out),
             };
-            return Ok(Self::Whole {
+            Rows::InMemory {
                 data,
                 training,
                 held_out,
-            });
-        }
-        let (mut training, mut held_out) = (sizes.len(), 0);
-        while training > 1 && (held_out as f64) < share * rows as f64 {
-            training -= 1;
-            held_out += sizes[training];
-        }
-        Ok(Self::Streamed {
-            read,
-            sizes: sizes.to_vec(),
-            training,
-            most,
-        })
+            }
+        } else {
+            let (mut training, mut held_out) = (sizes.len(), 0);
+            while training > 1 && (held_out as f64) < share * count as f64 {
+                training -= 1;
+                held_out += sizes[training];
+            }
+            Rows::Streamed {
+                sizes: sizes.to_vec(),
+                training,
+                most,
+            }
+        };
+        Ok(Self { read, seed, rows })
     }
 
     /// Rows that are trained on.
     pub fn rows(&self) -> usize {
-        match self {
-            Self::Whole { training, .. } => training.len(),
-            Self::Streamed {
+        match &self.rows {
+            Rows::InMemory { training, .. } => training.len(),
+            Rows::Streamed {
                 sizes, training, ..
             } => sizes[..*training].iter().sum(),
         }
     }
 
     /// The parts of each block of an epoch.
-    pub fn blocks(&self, epoch: usize, seed: u64) -> Vec<Vec<usize>> {
-        match self {
-            Self::Whole { .. } => vec![vec![]],
-            Self::Streamed {
+    pub fn blocks(&self, epoch: usize) -> Vec<Vec<usize>> {
+        match &self.rows {
+            Rows::InMemory { .. } => vec![vec![]],
+            Rows::Streamed {
                 sizes,
                 training,
                 most,
-                ..
             } => {
                 let mut parts: Vec<usize> = (0..*training).collect();
-                parts.shuffle(&mut order(seed, epoch, 0));
+                parts.shuffle(&mut self.order(epoch, 0));
                 grouped(&parts, sizes, *most)
             }
         }
@@ -136,27 +219,17 @@ impl<'a> Feed<'a> {
         parts: &[usize],
         block: usize,
         epoch: usize,
-        seed: u64,
     ) -> Result<Block<'_>, NetworkError> {
-        Ok(match self {
-            Self::Whole { data, training, .. } => {
-                let mut rows = training.clone();
-                rows.shuffle(&mut order(seed, epoch, 0));
-                Block {
-                    data: Cow::Borrowed(data),
-                    order: rows,
-                }
+        let (data, mut order, number) = match &self.rows {
+            Rows::InMemory { data, training, .. } => (Cow::Borrowed(data), training.clone(), 0),
+            Rows::Streamed { .. } => {
+                let data = together(self.read, parts.iter().copied())?;
+                let order = (0..data.targets.nrows()).collect();
+                (Cow::Owned(data), order, 1 + block)
             }
-            Self::Streamed { read, .. } => {
-                let data = together(read, parts.iter().copied())?;
-                let mut rows: Vec<usize> = (0..data.targets.len()).collect();
-                rows.shuffle(&mut order(seed, epoch, 1 + block));
-                Block {
-                    data: Cow::Owned(data),
-                    order: rows,
-                }
-            }
-        })
+        };
+        order.shuffle(&mut self.order(epoch, number));
+        Ok(Block { data, order })
     }
 
     /// The mean of `error` over the rows held out; `None` where there are none.
@@ -164,11 +237,10 @@ impl<'a> Feed<'a> {
         &self,
         error: impl Fn(&Data) -> Result<f64, NetworkError>,
     ) -> Result<Option<f64>, NetworkError> {
-        match self {
-            Self::Whole { held_out, .. } if held_out.targets.len() == 0 => Ok(None),
-            Self::Whole { held_out, .. } => Ok(Some(error(held_out)?)),
-            Self::Streamed {
-                read,
+        match &self.rows {
+            Rows::InMemory { held_out, .. } if held_out.targets.is_empty() => Ok(None),
+            Rows::InMemory { held_out, .. } => Ok(Some(error(held_out)?)),
+            Rows::Streamed {
                 sizes,
                 training,
                 most,
@@ -176,8 +248,8 @@ impl<'a> Feed<'a> {
                 let parts: Vec<usize> = (*training..sizes.len()).collect();
                 let (mut total, mut rows) = (0.0, 0.0);
                 for block in grouped(&parts, sizes, *most) {
-                    let data = together(read, block.into_iter())?;
-                    let here = data.targets.len() as f64;
+                    let data = together(self.read, block.into_iter())?;
+                    let here = data.targets.nrows() as f64;
                     total += here * error(&data)?;
                     rows += here;
                 }
@@ -185,16 +257,16 @@ impl<'a> Feed<'a> {
             }
         }
     }
-}
 
-/// The generator that orders the rows of a block, or (number 0) the parts or the only block of an epoch. An epoch depends
-/// on its number alone.
-fn order(seed: u64, epoch: usize, number: usize) -> ChaCha8Rng {
-    let epoch = derive(seed, Purpose::Shuffle, epoch as u64);
-    ChaCha8Rng::seed_from_u64(match number {
-        0 => epoch,
-        number => derive(epoch, Purpose::Shuffle, number as u64),
-    })
+    /// The generator that orders the rows of a block, or (number 0) the parts or the only block of an epoch. An epoch depends
+    /// on its number alone.
+    fn order(&self, epoch: usize, number: usize) -> ChaCha8Rng {
+        let epoch = derive(self.seed, Purpose::Shuffle, epoch as u64);
+        ChaCha8Rng::seed_from_u64(match number {
+            0 => epoch,
+            number => derive(epoch, Purpose::Shuffle, number as u64),
+        })
+    }
 }
 
 /// Parts one after another, as many at a time as have at most `most` rows, but at least one.
@@ -215,17 +287,20 @@ fn grouped(parts: &[usize], sizes: &[usize], most: usize) -> Vec<Vec<usize>> {
 }
 
 fn together(read: &Read<'_>, parts: impl Iterator<Item = usize>) -> Result<Data, NetworkError> {
-    let mut all: Option<Data> = None;
-    for part in parts {
-        let data = read(part)?;
-        match &mut all {
-            None => all = Some(data),
-            Some(all) => all.append(data),
-        }
+    let mut parts = parts.map(read).collect::<Result<Vec<Data>, _>>()?;
+    if parts.len() == 1 {
+        return Ok(parts.remove(0));
     }
-    all.ok_or(NetworkError::Empty {
-        what: "samples",
-        least: 1,
+    let stacked = |of: fn(&Data) -> &Array2<f32>| {
+        let views: Vec<_> = parts.iter().map(|data| of(data).view()).collect();
+        ndarray::concatenate(Axis(0), &views).map_err(|_| NetworkError::Empty {
+            what: "samples",
+            least: 1,
+        })
+    };
+    Ok(Data {
+        features: stacked(|data| &data.features)?,
+        targets: stacked(|data| &data.targets)?,
     })
 }
 
@@ -253,6 +328,7 @@ fn split(count: usize, share: f64, seed: u64) -> Result<(Vec<usize>, Vec<usize>)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ndarray::array;
     use std::cell::RefCell;
     use std::collections::HashSet;
 
@@ -277,19 +353,20 @@ mod tests {
     fn part(sizes: &[usize], part: usize) -> Data {
         let first: usize = sizes[..part].iter().sum();
         let numbers: Vec<f32> = (first..first + sizes[part]).map(|i| i as f32).collect();
+        let column = Array2::from_shape_vec((sizes[part], 1), numbers).unwrap();
         Data {
-            features: Rows::new(1, numbers.clone()),
-            targets: Rows::new(1, numbers),
+            features: column.clone(),
+            targets: column,
         }
     }
 
     /// The rows of an epoch in the order of their use.
     fn epoch(feed: &Feed<'_>, epoch: usize) -> Vec<usize> {
         let mut all = Vec::new();
-        for (number, parts) in feed.blocks(epoch, 7).iter().enumerate() {
-            let block = feed.block(parts, number, epoch, 7).unwrap();
-            let numbers = block.data.features.numbers();
-            all.extend(block.order.iter().map(|i| numbers[*i] as usize));
+        for (number, parts) in feed.blocks(epoch).iter().enumerate() {
+            let block = feed.block(parts, number, epoch).unwrap();
+            let numbers = &block.data.features;
+            all.extend(block.order.iter().map(|i| numbers[[*i, 0]] as usize));
         }
         all
     }
@@ -300,7 +377,7 @@ mod tests {
         let read = |index: usize| Ok(part(&sizes, index));
         for (most, in_memory) in [(100, true), (8, false), (3, false)] {
             let feed = Feed::with_block(&sizes, most, &read, 0.2, 1).unwrap();
-            assert_eq!(matches!(feed, Feed::Whole { .. }), in_memory);
+            assert_eq!(matches!(feed.rows, Rows::InMemory { .. }), in_memory);
             let [first, second] = [0, 1].map(|e| epoch(&feed, e));
             assert_ne!(first, second);
             assert_eq!(
@@ -311,11 +388,11 @@ mod tests {
             assert_eq!(first.len(), feed.rows());
             let held_out = RefCell::new(Vec::new());
             let mean = feed.held_out(|data| {
-                let numbers = data.features.numbers();
+                let numbers = &data.features;
                 held_out
                     .borrow_mut()
                     .extend(numbers.iter().map(|v| *v as usize));
-                Ok(f64::from(numbers.iter().sum::<f32>()) / numbers.len() as f64)
+                Ok(f64::from(numbers.sum()) / numbers.len() as f64)
             });
             let held_out = held_out.into_inner();
             let sum: usize = held_out.iter().sum();
@@ -339,5 +416,14 @@ mod tests {
         let feed = Feed::with_block(&sizes, 8, &read, 0.0, 1).unwrap();
         assert_eq!(feed.rows(), 19);
         assert_eq!(feed.held_out(|_| Ok(1.0)).unwrap(), None);
+    }
+
+    #[test]
+    fn rows_are_padded_and_what_is_not_finite_in_32_bits_is_named() {
+        let rows = padded("features", &array![[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], 3).unwrap();
+        assert_eq!(gathered(&rows, &[2, 0]), [5.0, 6.0, 0.0, 1.0, 2.0, 0.0]);
+        let error = padded("targets", &array![[1.0, 1e300]], 2).unwrap_err();
+        let said = error.to_string();
+        assert!(said.starts_with("targets, row 0, column 1: 1"), "{said}");
     }
 }

@@ -1,8 +1,46 @@
-//! Affine map from features to unit variance.
+//! Scaling of features and parameters to unit size.
 
-use super::scaler::Scaler;
 use crate::math::{MathError, Whitening, to_array};
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, ArrayView1, aview1};
+
+/// z = (x − mean)/scale for each column; a column that never changes has scale 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scaler {
+    /// Means.
+    pub mean: Vec<f64>,
+    /// Standard deviations.
+    pub scale: Vec<f64>,
+}
+
+impl Scaler {
+    /// From rows of samples.
+    pub fn fit(samples: &Array2<f64>) -> Self {
+        let size = |column: ArrayView1<'_, f64>| column.fold(0.0, |a: f64, v| a.max(v.abs()));
+        let deviation = |column: ArrayView1<'_, f64>| match column.std(0.0) {
+            // Rounding of the mean must not be blown up to unit size.
+            deviation if deviation > 1e-12 * size(column) => deviation,
+            _ => 1.0,
+        };
+        Self {
+            mean: samples
+                .columns()
+                .into_iter()
+                .map(|c| c.mean().unwrap_or(0.0))
+                .collect(),
+            scale: samples.columns().into_iter().map(deviation).collect(),
+        }
+    }
+
+    /// z.
+    pub fn apply(&self, samples: &Array2<f64>) -> Array2<f64> {
+        (samples - &aview1(&self.mean)) / aview1(&self.scale)
+    }
+
+    /// x from z.
+    pub fn invert(&self, z: &Array2<f64>) -> Array2<f64> {
+        z * &aview1(&self.scale) + aview1(&self.mean)
+    }
+}
 
 /// Network inputs z = clip((x − mean)·W, ±limit), as many as features.
 ///
@@ -45,13 +83,7 @@ impl Standardiser {
 
     /// z of features (rows: samples).
     pub fn apply(&self, features: &Array2<f64>) -> Array2<f64> {
-        let mut centred = features.clone();
-        for mut row in centred.rows_mut() {
-            for (value, mean) in row.iter_mut().zip(&self.mean) {
-                *value -= mean;
-            }
-        }
-        let mut z = centred.dot(&self.matrix);
+        let mut z = (features - &aview1(&self.mean)).dot(&self.matrix);
         z.mapv_inplace(|v| v.clamp(-self.limit, self.limit));
         z
     }
@@ -61,6 +93,21 @@ impl Standardiser {
 mod tests {
     use super::*;
     use crate::twin::Noise;
+
+    #[test]
+    fn there_and_back_with_a_constant_column() {
+        let samples = Array2::from_shape_fn((9, 3), |(i, j)| match j {
+            0 => i as f64,
+            1 => 0.1,
+            _ => 1e-9 * (i as f64).sin(),
+        });
+        let scaler = Scaler::fit(&samples);
+        let z = scaler.apply(&samples);
+        assert!(z.column(1).iter().all(|v| v.abs() < 1e-12));
+        assert!((z.column(2).std(0.0) - 1.0).abs() < 1e-9);
+        let back = scaler.invert(&z);
+        assert!((&back - &samples).iter().all(|d| d.abs() < 1e-15));
+    }
 
     /// Two features that differ by a thousandth of their size, a third in another unit, a fourth constant.
     fn samples() -> Array2<f64> {

@@ -1,6 +1,6 @@
 //! Simulations from the prior of a study.
 
-use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
+use super::{Draw, Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::feature::FeatureRecipe;
 use crate::progress::Stage;
