@@ -135,7 +135,13 @@ fn penalty_gradient(stacked: ArrayView2<'_, f32>, heads: usize, lambda: f32) -> 
         }
         if j > 0 {
             let (earlier, block) = (s![..start, ..], gram.slice(s![..start, start..end]));
-            general_mat_mul(2.0 * lambda, &block.t(), &stacked.slice(earlier), 1.0, &mut slope);
+            general_mat_mul(
+                2.0 * lambda,
+                &block.t(),
+                &stacked.slice(earlier),
+                1.0,
+                &mut slope,
+            );
         }
     }
     gradient
