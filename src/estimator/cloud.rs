@@ -7,7 +7,7 @@
 use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::Refined;
-use crate::fit::posterior::Region;
+use crate::fit::posterior::PosteriorRegion;
 use crate::math::{median, principal_axes};
 use crate::progress::Progress;
 use crate::record::Drive;
@@ -195,7 +195,7 @@ pub struct Cloud<'a> {
     /// Gauss–Newton's estimate.
     pub refined: &'a Refined,
     /// Where the record puts θ, if the features are about its mean.
-    pub region: Option<&'a Region>,
+    pub region: Option<&'a PosteriorRegion>,
     /// Settings.
     pub settings: &'a CloudSettings,
 }

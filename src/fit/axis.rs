@@ -31,7 +31,7 @@ pub(crate) struct Axis {
     pub counts: bool,
     /// True where a fit leaves it at its start.
     pub held: bool,
-    /// Where every search begins, whatever the point that it is given says.
+    /// Start of every search, whatever the point that it is given says.
     pub begin: Option<f64>,
     /// Stands for the normal prior in evidence.
     pub evidence: EvidencePrior,

@@ -2,12 +2,11 @@
 
 use super::climb::Fitted;
 use super::problem::Problem;
-use super::starts::agreeing;
-
-/// Distance from the top that counts as arrived, in standard deviations: what is left to gain is its square's half, 0.02 nats.
-const ARRIVED: f64 = 0.2;
-/// The same where three searches, or most of them, end at one top: dry friction and thresholds make kinks, and at a kink no gradient vanishes.
-const AGREED: f64 = 1.0;
+use super::searched::ITERATIONS;
+use super::starts::{agreeing, climbs, polish, sort};
+use crate::fit::budget::BUDGET;
+use crate::likelihood::kalman::FilterError;
+use crate::twin::Noise;
 
 /// Side of a bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -72,7 +71,37 @@ impl Certificate {
     pub fn has_converged(&self) -> bool {
         // Three that began apart need no majority: some starts are there to find other tops.
         let enough = self.agreeing > 2 || 2 * self.agreeing > self.searches && self.agreeing > 1;
-        self.distance <= ARRIVED && (self.agreeing > 1 || self.searches == 1)
-            || self.distance <= AGREED && enough
+        self.distance <= BUDGET.arrived && (self.agreeing > 1 || self.searches == 1)
+            || self.distance <= BUDGET.agreed && enough
     }
+}
+
+/// Searches from points drawn over the prior, not chosen near any top, until a round of them finds nothing better; `false` where the last
+/// round still does. Ends join `fits`. Of a simulated likelihood, whose searches cost ensembles, nothing is asked.
+pub(super) fn restarted(
+    problem: &Problem,
+    fits: &mut Vec<Fitted>,
+    noise: Noise,
+) -> Result<bool, FilterError> {
+    if problem.is_simulated() || fits.is_empty() {
+        return Ok(true);
+    }
+    let space = problem.twin.parameters();
+    for round in 0..BUDGET.restart_rounds {
+        let starts: Vec<Vec<f64>> = (0..BUDGET.restarts)
+            .map(|i| {
+                let noise = noise.sample(round * BUDGET.restarts + i);
+                let theta = problem.full(&space.draw_prior(noise));
+                problem.begin(&problem.drawn(theta, noise))
+            })
+            .collect();
+        let best = fits[0].objective;
+        fits.extend(climbs(problem, &starts, ITERATIONS)?);
+        sort(fits);
+        if fits[0].objective <= best + BUDGET.restart_gain {
+            return Ok(true);
+        }
+        *fits = polish(problem, std::mem::take(fits), ITERATIONS)?;
+    }
+    Ok(false)
 }

@@ -1,12 +1,16 @@
 //! The most probable θ of a twin, given its records and a weak prior.
 
 use crate::fit::problem::Problem;
-use crate::fit::slope::{Slope, slope as slope_at};
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::fit::slope::model;
+use crate::fit::solver::{LocalModel, Objective, Solver};
+use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
 use nalgebra::{DMatrix, DVector};
 
-/// Steps may be so many times the longest of an entry where entries answer each other.
-const LONGER: f64 = 2.0;
+/// Damping of the first step, and the least one: far from the top the information is often too small.
+const DAMPING: f64 = 0.1;
+const LEAST_DAMPING: f64 = 1e-6;
+/// Largest entry of a step in φ that is not worth a pass.
+const LEAST_STEP: f64 = 1e-9;
 
 /// Result of a fit.
 #[derive(Debug, Clone)]
@@ -37,65 +41,72 @@ impl Fitted {
 
 /// Damped Fisher scoring from one start, within the bounds; `None` where the filter does not work at the start.
 ///
-/// ```text
-/// (F + λ·diag F)·δ = s,   φ ← φ + δ,   λ smaller after a step that helps, larger after one that does not
-/// ```
-///
-/// F holds the information of the weak prior too. Entries at a bound that want to leave it are held for the step. A trial
-/// point where the filter fails only rejects the step.
+/// The information holds that of the weak prior, too.
 pub(crate) fn climb(
     problem: &Problem,
     start: &[f64],
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
     let c = &problem.coordinates;
-    let mut phi = c.clamp(&DVector::from_vec(c.of(&problem.clamp(start))));
-    let first = recoverable(slope_at(problem, &c.theta(phi.as_slice()), None))?;
-    let Some(mut slope) = first.filter(|s| s.objective().is_finite()) else {
-        return Ok(None);
+    let solver = Solver {
+        lower: c.lower(),
+        upper: c.upper(),
+        longest: problem.axes.iter().map(|axis| axis.longest).collect(),
+        held: problem.axes.iter().map(|axis| axis.held).collect(),
+        iterations: iterations as u64,
+        damping: DAMPING,
+        least_damping: LEAST_DAMPING,
+        gain: problem.done(),
+        relative_gain: 0.0,
+        least_step: LEAST_STEP,
+        models_end: true,
     };
-    let mut damping: f64 = 0.1;
-    let mut tried = 0;
-    while tried < iterations && damping < 1e5 {
-        tried += 1;
-        let Some(step) = step(problem, &slope, &phi, damping) else {
-            break;
-        };
-        let next = c.clamp(&(&phi + &step));
-        let moved = (&next - &phi).amax();
-        // Not worth a look: the gain that the step promises is nothing.
-        if moved < 1e-9 || slope.gradient.dot(&step) < 0.2 * problem.done() {
-            break;
-        }
-        // The likelihood alone tells whether to go there; the derivatives follow if so.
-        let theta = c.theta(next.as_slice());
-        let trial = recoverable(problem.evaluate(&theta))?.map(|trial| {
-            let objective = trial.log_likelihood + problem.log_prior(&theta, true);
-            (objective, trial.innovations)
-        });
-        match trial {
-            Some((objective, innovations)) if objective > slope.objective() => {
-                let gain = objective - slope.objective();
-                let Some(better) = recoverable(slope_at(problem, &theta, innovations))? else {
-                    break;
-                };
-                (phi, slope) = (next, better);
-                damping = (0.1 * damping).max(1e-6);
-                if gain < problem.done() {
-                    break;
-                }
-            }
-            _ => damping = (8.0 * damping).max(1e-3),
+    let start = DVector::from_vec(c.of(&problem.clamp(start)));
+    let end = recoverable(solver.minimise(&LogPosterior(problem), &start))?;
+    Ok(end.and_then(|end| {
+        let theta = c.theta(end.x.as_slice());
+        let model = end.model?;
+        Some(Fitted {
+            log_likelihood: -model.cost - problem.log_prior(&theta, true),
+            objective: -model.cost,
+            gradient: -model.gradient,
+            information: model.information,
+            theta,
+        })
+    }))
+}
+
+/// Minus the log-posterior of the weak priors, in φ.
+struct LogPosterior<'p>(&'p Problem);
+
+impl Objective for LogPosterior<'_> {
+    /// Innovations of a black box.
+    type Trial = Option<Vec<Filtered>>;
+    type Error = FilterError;
+
+    fn is_rejection(error: &FilterError) -> bool {
+        error.is_recoverable()
+    }
+
+    fn cost(&self, phi: &DVector<f64>) -> Result<(f64, Self::Trial), FilterError> {
+        let theta = self.0.coordinates.theta(phi.as_slice());
+        let trial = self.0.evaluate(&theta)?;
+        let objective = trial.log_likelihood + self.0.log_prior(&theta, true);
+        Ok((-objective, trial.innovations))
+    }
+
+    fn model(
+        &self,
+        phi: &DVector<f64>,
+        trial: Option<Self::Trial>,
+    ) -> Result<LocalModel, FilterError> {
+        let theta = self.0.coordinates.theta(phi.as_slice());
+        let model = model(self.0, &theta, trial.flatten())?;
+        match model.cost.is_finite() {
+            true => Ok(model),
+            false => Err(FilterError::Diverged { at: 0.0 }),
         }
     }
-    let theta = c.theta(phi.as_slice());
-    Ok(Some(Fitted {
-        log_likelihood: slope.log_likelihood,
-        objective: slope.objective(),
-        gradient: slope.gradient,
-        information: slope.information,
-        theta,
-    }))
 }
 
 /// Returns what moves a start to where all other entries have answered those of a shape, which stay: a threshold, a lag or a time would go
@@ -111,47 +122,6 @@ pub(crate) fn settling(
         Some(held) => Ok(climb(held, &start, iterations)?.map_or(start, |settled| settled.theta)),
         None => Ok(start),
     }
-}
-
-/// The damped step, entries held at their bounds left out.
-fn step(
-    problem: &Problem,
-    slope: &Slope,
-    phi: &DVector<f64>,
-    damping: f64,
-) -> Option<DVector<f64>> {
-    let c = &problem.coordinates;
-    let free: Vec<usize> = (0..phi.len())
-        .filter(|&j| {
-            let out_below = phi[j] <= c.lower()[j] && slope.gradient[j] < 0.0;
-            let out_above = phi[j] >= c.upper()[j] && slope.gradient[j] > 0.0;
-            !(out_below || out_above || problem.axes[j].held)
-        })
-        .collect();
-    let n = free.len();
-    if n == 0 {
-        return None;
-    }
-    // An entry's curvature is at least what its longest step needs: far from the top the information is often too small, and one
-    // entry's long step must not shorten those of the others.
-    let matrix = DMatrix::from_fn(n, n, |a, b| {
-        let value = slope.information[(free[a], free[b])];
-        if a == b {
-            let least = slope.gradient[free[a]].abs() / problem.axes[free[a]].longest;
-            value.max(least) * (1.0 + damping) + f64::MIN_POSITIVE
-        } else {
-            value
-        }
-    });
-    let gradient = DVector::from_fn(n, |a, _| slope.gradient[free[a]]);
-    let part = matrix.cholesky()?.solve(&gradient);
-    let mut step = DVector::zeros(phi.len());
-    let mut shrink: f64 = 1.0;
-    for (a, &j) in free.iter().enumerate() {
-        step[j] = part[a];
-        shrink = shrink.min(LONGER * problem.axes[j].longest / part[a].abs().max(1e-300));
-    }
-    step.iter().all(|v| v.is_finite()).then(|| step * shrink)
 }
 
 /// The best of several starts.

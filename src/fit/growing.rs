@@ -3,21 +3,14 @@
 //! Runs do not follow a record, they start with it: at a wrong θ a run of an oscillator is soon in another phase, and the
 //! likelihood of a whole record has a top for each cycle that is lost. Over the first quarter of a record there is one.
 
-use crate::fit::climb::{Fitted, climb};
+use crate::fit::budget::BUDGET;
+use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
+use crate::fit::starts::climbs;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::record::Record;
 use crate::twin::Noise;
 use rayon::prelude::*;
-
-/// Shares of the records, and how many of the best fits go on to the next.
-const SHARES: [f64; 2] = [0.25, 0.5];
-const KEPT: usize = 2;
-/// Points whose likelihood is looked at over the first share, and how many become starts.
-const SCREENED: u64 = 32;
-const STARTS: usize = 4;
-/// Iterations of a fit.
-const ITERATIONS: usize = 25;
 
 /// The best θ of all starts; `None` where the twin can be simulated at none.
 pub(crate) fn base_fit(
@@ -27,7 +20,7 @@ pub(crate) fn base_fit(
 ) -> Result<Option<Fitted>, FilterError> {
     let space = problem.twin.parameters();
     let initial = initial.map(|theta| problem.clamp(&problem.full(theta)));
-    let mut starts: Vec<Vec<f64>> = (0..SCREENED)
+    let mut starts: Vec<Vec<f64>> = (0..BUDGET.grown_points)
         .map(|i| {
             let noise = noise.child("starts").sample(i);
             let theta = match i % 2 {
@@ -39,7 +32,7 @@ pub(crate) fn base_fit(
         .chain([problem.centre()])
         .chain(initial.clone())
         .collect();
-    for (level, share) in SHARES.into_iter().enumerate() {
+    for (level, share) in BUDGET.grown_shares.into_iter().enumerate() {
         let begun: Vec<Record> = (problem.records.iter())
             .map(|r| {
                 let part = r.first_part(((share * r.samples() as f64) as usize).max(1));
@@ -60,25 +53,17 @@ pub(crate) fn base_fit(
             all.sort_by(|a, b| b.0.total_cmp(&a.0));
             starts = all
                 .into_iter()
-                .take(STARTS)
+                .take(BUDGET.grown_starts)
                 .map(|(_, theta)| theta)
                 .collect();
         }
-        let mut fits = fits(&short, &starts)?;
-        fits.truncate(KEPT);
+        let mut fits = climbs(&short, &starts, BUDGET.grown_iterations)?;
+        fits.truncate(BUDGET.grown_kept);
         starts = fits.into_iter().map(|f| f.theta).collect();
     }
     starts.extend(initial);
     starts.push(problem.centre());
-    Ok(fits(problem, &starts)?.into_iter().next())
-}
-
-/// Fits from all starts, best first.
-fn fits(problem: &Problem, starts: &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> {
-    let fits: Vec<Option<Fitted>> = (starts.par_iter())
-        .map(|start| climb(problem, start, ITERATIONS))
-        .collect::<Result<_, _>>()?;
-    let mut fits: Vec<Fitted> = fits.into_iter().flatten().collect();
-    fits.sort_by(|a, b| b.objective.total_cmp(&a.objective));
-    Ok(fits)
+    Ok(climbs(problem, &starts, BUDGET.grown_iterations)?
+        .into_iter()
+        .next())
 }

@@ -7,7 +7,9 @@
 //! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
 //! | `score.rs` | how well a fit predicts a record that it has not seen |
 //! | `follow.rs` | how the fitted twin follows its records |
+//! | `budget.rs` | cost and tolerances of a fit |
 //! | `starts.rs`, `spectral.rs`, `growing.rs` | where does a search begin |
+//! | `solver.rs` | the one solver, on argmin |
 //! | `climb.rs`, `slope.rs` | the most probable θ |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `passes.rs` | what a search costs |
@@ -15,9 +17,10 @@
 //! | `reference.rs` | linear gain of a direction beside θ |
 //! | `doubts.rs` | reasons to doubt a result, in one list |
 //! | `posterior/` | draws of θ given the records, as a table, as errors and intervals, as a region |
-//! | `least_squares/` | Gauss–Newton on residuals, on argmin |
+//! | `least_squares/` | the solver on residuals |
 
 pub(crate) mod axis;
+mod budget;
 pub(crate) mod certificate;
 pub(crate) mod climb;
 pub(crate) mod doubts;
@@ -34,6 +37,7 @@ mod run;
 mod score;
 mod searched;
 mod slope;
+mod solver;
 mod spectral;
 pub(crate) mod starts;
 

@@ -1,7 +1,7 @@
 //! Result of a fit.
 
 use super::certificate::Side;
-use super::posterior::{Posterior, Region};
+use super::posterior::{Posterior, PosteriorRegion};
 use crate::record::Signal;
 use crate::twin::Noise;
 use serde::Serialize;
@@ -69,9 +69,9 @@ pub struct Fit {
     /// Free run beside each record, N × outputs; none where it diverges.
     #[serde(skip)]
     pub free_runs: Vec<Option<Signal>>,
-    /// Where the records put the twin's own parameters; none where there are none.
+    /// Region of the twin's own parameters; none where there are none.
     #[serde(skip)]
-    pub(crate) region: Option<Region>,
+    pub(crate) region: Option<PosteriorRegion>,
 }
 
 /// A parameter, or a magnitude of an effect.

@@ -1,6 +1,6 @@
 //! Fit of a twin to records, with fitted noise and uncertain starts.
 
-use super::certificate::Certificate;
+use super::certificate::{Certificate, restarted};
 use super::climb::{Fitted, climb};
 use super::doubts::Doubts;
 use super::evidence::evidence;
@@ -8,22 +8,17 @@ use super::follow::{free_runs, starts};
 use super::outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, OutputErrors,
 };
-use super::posterior::{Draws, Region, Spread, posterior, table};
+use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
 use super::problem::Problem;
 use super::searched::{ITERATIONS, Searched};
 use super::starts::polish;
+use crate::fit::budget::BUDGET;
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, Measured};
 use crate::math::deviation;
 use crate::record::Signal;
 use crate::twin::{Noise, Role, Twin};
 use std::time::Instant;
-
-/// Nats by which a fit with effects may end below one without, since the priors of the effects count, too.
-const BELOW: f64 = 0.5;
-
-/// Searches from posterior draws that are better than the best fit.
-const RESTARTS: usize = 6;
 
 /// Subject of a fit: a twin in its study's setting.
 pub(crate) struct Subject<'a> {
@@ -45,10 +40,11 @@ pub(crate) fn run(
         without,
         off,
     } = searched;
+    let arrived = restarted(&problem, &mut fits, noise.child("restarts"))?;
     let levels = &measured.levels;
     let asked = (settings.draws > 0).then_some(settings.draws);
     let draws = match problem.is_simulated() && asked.is_none() {
-        true => Draws::default(),
+        true => PosteriorSample::default(),
         false => drawn(&problem, &mut fits, asked, noise.child("posterior"))?,
     };
     let Some((fitted, certificate)) =
@@ -56,8 +52,8 @@ pub(crate) fn run(
     else {
         return Ok(None);
     };
-    let evidence = evidence(&problem, &fitted, &draws.proposals, noise.child("evidence"))?;
-    let spread = Spread::new(&problem, &fitted, &draws.thetas, settings.level);
+    let evidence = evidence(&problem, &fitted, &draws, noise.child("evidence"))?;
+    let spread = FitIntervals::new(&problem, &fitted, &draws.thetas, settings.level);
     let (parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
     let smoothed = problem.smoothed(&fitted.theta)?;
     let free_runs = free_runs(&problem, &fitted.theta, &smoothed);
@@ -69,12 +65,12 @@ pub(crate) fn run(
     };
     let errors = errors(&problem, &fitted.theta, &free_runs)?;
     let mut convergence = Convergence {
-        converged: certificate.has_converged(),
+        converged: arrived && certificate.has_converged(),
         distance: certificate.distance,
         agreeing: certificate.agreeing,
         searches: certificate.searches,
     };
-    let ends = without.is_none_or(|base| fitted.log_likelihood > base - BELOW);
+    let ends = without.is_none_or(|base| fitted.log_likelihood > base - BUDGET.below_without);
     convergence.converged &= ends;
     let mut doubts = Doubts::new(&problem, &fitted.theta);
     doubts.below(without.filter(|_| !ends), fitted.log_likelihood);
@@ -85,7 +81,7 @@ pub(crate) fn run(
     Ok(Some(Fit {
         parameters,
         noise: noise_levels,
-        region: Region::new(&problem, &fitted, &draws, start, own),
+        region: PosteriorRegion::new(&problem, &fitted, &draws, start, own),
         starts,
         level: settings.level,
         log_likelihood: fitted.log_likelihood,
@@ -117,9 +113,9 @@ fn drawn(
     fits: &mut Vec<Fitted>,
     asked: Option<usize>,
     noise: Noise,
-) -> Result<Draws, FilterError> {
+) -> Result<PosteriorSample, FilterError> {
     let mut draws = posterior(problem, fits, asked, noise)?;
-    for _ in 0..RESTARTS {
+    for _ in 0..BUDGET.restarts_from_draws {
         let Some(better) = draws.better.take() else {
             break;
         };
@@ -140,7 +136,7 @@ fn values(
     fitted: &Fitted,
     certificate: &Certificate,
     levels: &[Level],
-    spread: &Spread,
+    spread: &FitIntervals,
 ) -> (Vec<FittedValue>, Vec<FittedNoise>) {
     let space = problem.twin.parameters();
     let errors = &spread.errors;

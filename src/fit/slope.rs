@@ -5,84 +5,62 @@
 
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
+use crate::fit::solver::LocalModel;
 use crate::likelihood::kalman::{FilterError, Filtered};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Gradient and information of all records and the weak prior, in φ.
-pub(super) struct Slope {
-    pub log_likelihood: f64,
-    /// Log-density of the weak priors, all of them, up to a constant.
-    pub log_prior: f64,
-    pub gradient: DVector<f64>,
-    pub information: DMatrix<f64>,
-}
-
-impl Slope {
-    /// Slope of the weak prior's density alone, its gradient yet to be added.
-    fn zero(problem: &Problem, theta: &[f64]) -> Self {
-        let d = problem.dimension();
-        Self {
-            log_likelihood: 0.0,
-            log_prior: problem.log_prior(theta, true),
-            gradient: DVector::zeros(d),
-            information: DMatrix::zeros(d, d),
-        }
-    }
-
-    pub fn objective(&self) -> f64 {
-        self.log_likelihood + self.log_prior
-    }
-}
-
-/// Returns gradient and information at θ; `innovations` are those of a black box at θ, where they are known.
-pub(super) fn slope(
+/// Quadratic model of minus the log-posterior at θ, the weak priors included; `innovations` are those of a black box at θ, where they are known.
+pub(super) fn model(
     problem: &Problem,
     theta: &[f64],
     innovations: Option<Vec<Filtered>>,
-) -> Result<Slope, FilterError> {
-    let mut slope = if problem.is_simulated() {
-        let innovations = innovations.map_or_else(|| problem.filtered(theta), Ok)?;
-        by_differences(problem, theta, innovations)?
-    } else {
-        by_scores(problem, theta)?
+) -> Result<LocalModel, FilterError> {
+    let d = problem.dimension();
+    let mut model = LocalModel {
+        cost: 0.0,
+        gradient: DVector::zeros(d),
+        information: DMatrix::zeros(d, d),
     };
-    add_priors(problem, theta, &mut slope);
-    Ok(slope)
+    if problem.is_simulated() {
+        let innovations = innovations.map_or_else(|| problem.filtered(theta), Ok)?;
+        add_differences(problem, theta, innovations, &mut model)?;
+    } else {
+        add_scores(problem, theta, &mut model)?;
+    }
+    model.cost -= problem.log_prior(theta, true);
+    let phi = problem.coordinates.of(theta);
+    for (j, (centre, precision)) in problem.prior_terms().enumerate() {
+        model.gradient[j] += precision * (phi[j] - centre);
+        model.information[(j, j)] += precision;
+    }
+    Ok(model)
 }
 
-/// Gradient and information from the filter's score of each record.
-fn by_scores(problem: &Problem, theta: &[f64]) -> Result<Slope, FilterError> {
-    let mut slope = Slope::zero(problem, theta);
+/// Adds the filter's score of each record.
+fn add_scores(problem: &Problem, theta: &[f64], model: &mut LocalModel) -> Result<(), FilterError> {
     for (r, place) in problem.places.iter().enumerate() {
         let Some(score) = problem.score(r, theta)? else {
             continue;
         };
-        slope.log_likelihood += score.log_likelihood;
+        model.cost -= score.log_likelihood;
         for (a, &i) in place.iter().enumerate() {
-            slope.gradient[i] += score.gradient[a];
+            model.gradient[i] -= score.gradient[a];
             for (b, &j) in place.iter().enumerate() {
-                slope.information[(i, j)] += score.fisher[(a, b)];
+                model.information[(i, j)] += score.fisher[(a, b)];
             }
         }
     }
-    Ok(slope)
+    Ok(())
 }
 
-fn add_priors(problem: &Problem, theta: &[f64], slope: &mut Slope) {
-    let phi = problem.coordinates.of(theta);
-    for (j, (centre, precision)) in problem.prior_terms().enumerate() {
-        slope.gradient[j] -= precision * (phi[j] - centre);
-        slope.information[(j, j)] += precision;
-    }
-}
-
-/// Gradient and information of an ensemble's likelihood at θ with these innovations, from differences.
-fn by_differences(
+/// Adds an ensemble's likelihood at θ with these innovations, derivatives from differences.
+fn add_differences(
     problem: &Problem,
     theta: &[f64],
     innovations: Vec<Filtered>,
-) -> Result<Slope, FilterError> {
+    model: &mut LocalModel,
+) -> Result<(), FilterError> {
     let here = Reference::bare(innovations);
     let directions: Vec<Option<DVector<f64>>> = (problem.neighbours(theta).into_par_iter())
         .enumerate()
@@ -94,16 +72,15 @@ fn by_differences(
             Ok(Some(here.direction(&there) / distance))
         })
         .collect::<Result<_, FilterError>>()?;
-    let mut slope = Slope::zero(problem, theta);
-    slope.log_likelihood = here.filtered.iter().map(|f| f.log_likelihood).sum();
+    model.cost -= here.filtered.iter().map(|f| f.log_likelihood).sum::<f64>();
     for (i, a) in directions.iter().enumerate() {
         let Some(a) = a else { continue };
-        slope.gradient[i] = here.residual().dot(a);
+        model.gradient[i] = -here.residual().dot(a);
         for (j, b) in directions.iter().enumerate().take(i + 1) {
             let Some(b) = b else { continue };
-            slope.information[(i, j)] = a.dot(b);
-            slope.information[(j, i)] = slope.information[(i, j)];
+            model.information[(i, j)] = a.dot(b);
+            model.information[(j, i)] = model.information[(i, j)];
         }
     }
-    Ok(slope)
+    Ok(())
 }

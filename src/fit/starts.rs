@@ -1,27 +1,11 @@
 //! Searches for the most probable θ, and where they begin.
 
+use crate::fit::budget::BUDGET;
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Noise;
 use rayon::prelude::*;
-
-/// Nats to the best within which a fit is carried on, and the gain at which it ends.
-const NEAR: f64 = 3.0;
-const POLISHED: f64 = 1e-4;
-/// Random points whose likelihood is looked at with loud noise, and with quiet noise for each free entry, eight at most. The wide valleys
-/// of loud noise are met by few.
-const LOUD: u64 = 48;
-const QUIET_EACH: u64 = 64;
-const MOST_ENTRIES: usize = 8;
-/// Number of the points of either that become starts.
-const STARTS: usize = 3;
-/// Deviations of the prior between two starts that lie apart: nearer ones are mostly of one valley.
-const APART: f64 = 1.0;
-/// Nats within which two fits have found the same top.
-const SAME: f64 = 0.1;
-/// Times that other starts are tried while only one search ends at the best top.
-const AGAIN: u64 = 3;
 
 /// Starts of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +29,7 @@ pub(crate) fn search(
         Care::Thorough => {
             let noise = noise.child("quiet starts");
             let quiet = screened(problem, noise, Screen::quiet(problem))?;
-            (Screen::LOUD_APART, quiet, AGAIN)
+            (Screen::LOUD_APART, quiet, BUDGET.more_starts)
         }
     };
     let starts: Vec<Vec<f64>> = [problem.begin(&problem.centre())]
@@ -80,7 +64,7 @@ struct Screen {
 
 impl Screen {
     const LOUD: Self = Self {
-        points: LOUD,
+        points: BUDGET.loud_points,
         is_loud: true,
         is_apart: false,
     };
@@ -95,7 +79,7 @@ impl Screen {
             .iter()
             .filter(|axis| !axis.held && axis.begin.is_none());
         Self {
-            points: QUIET_EACH * free.count().min(MOST_ENTRIES) as u64,
+            points: BUDGET.quiet_points * free.count().min(BUDGET.quiet_entries) as u64,
             is_loud: false,
             is_apart: true,
         }
@@ -129,7 +113,7 @@ fn screened(problem: &Problem, noise: Noise, screen: Screen) -> Result<Vec<Vec<f
     let mut starts: Vec<Vec<f64>> = vec![];
     for (_, theta) in screened {
         let is_new = |one: &Vec<f64>| !screen.is_apart || is_apart(problem, one, &theta);
-        if starts.len() < STARTS && starts.iter().all(is_new) {
+        if starts.len() < BUDGET.screened_starts && starts.iter().all(is_new) {
             starts.push(theta);
         }
     }
@@ -148,11 +132,12 @@ fn is_apart(problem: &Problem, one: &[f64], other: &[f64]) -> bool {
             } else {
                 axis.width
             };
-            (one[j] - other[j]).abs() > APART * unit
+            (one[j] - other[j]).abs() > BUDGET.starts_apart * unit
         })
 }
 
-fn climbs(
+/// Searches from all starts, best first.
+pub(super) fn climbs(
     problem: &Problem,
     starts: &[Vec<f64>],
     iterations: usize,
@@ -169,7 +154,7 @@ fn climbs(
 pub(super) fn agreeing(fits: &[Fitted]) -> usize {
     let best = fits.first().map_or(f64::NAN, |fit| fit.objective);
     (fits.iter())
-        .filter(|fit| fit.objective >= best - SAME)
+        .filter(|fit| fit.objective >= best - BUDGET.same_top)
         .count()
 }
 
@@ -179,11 +164,11 @@ pub(crate) fn polish(
     fits: Vec<Fitted>,
     iterations: usize,
 ) -> Result<Vec<Fitted>, FilterError> {
-    let precise = problem.until(POLISHED);
+    let precise = problem.until(BUDGET.polished_gain);
     let best = fits.first().map_or(f64::NAN, |fit| fit.objective);
     let mut fits: Vec<Fitted> = (fits.into_par_iter())
         .map(|fit| {
-            if best - fit.objective > NEAR {
+            if best - fit.objective > BUDGET.near {
                 return Ok(fit);
             }
             Ok(climb(&precise, &fit.theta, iterations)?.unwrap_or(fit))

@@ -38,14 +38,16 @@ pub(crate) trait Likelihood: Send + Sync {
 /// Returns a filter's likelihood for a twin with equations, an ensemble's for any other.
 pub(crate) fn likelihood_of(twin: &Twin) -> Arc<dyn Likelihood> {
     match twin {
-        Twin::Equations(twin) => Arc::new(Filter(twin.clone(), FilterSettings::default())),
-        Twin::BlackBox(twin) => Arc::new(Ensemble(twin.clone())),
+        Twin::Equations(twin) => {
+            Arc::new(FilterLikelihood(twin.clone(), FilterSettings::default()))
+        }
+        Twin::BlackBox(twin) => Arc::new(EnsembleLikelihood(twin.clone())),
     }
 }
 
-struct Filter(Arc<dyn StateSpace>, FilterSettings);
+struct FilterLikelihood(Arc<dyn StateSpace>, FilterSettings);
 
-impl Filter {
+impl FilterLikelihood {
     fn kalman<'a>(
         &'a self,
         record: &'a Record,
@@ -55,7 +57,7 @@ impl Filter {
     }
 }
 
-impl Likelihood for Filter {
+impl Likelihood for FilterLikelihood {
     fn outline(&self) -> Outline {
         self.0.outline()
     }
@@ -99,9 +101,9 @@ impl Likelihood for Filter {
     }
 }
 
-struct Ensemble(Arc<dyn DigitalTwin>);
+struct EnsembleLikelihood(Arc<dyn DigitalTwin>);
 
-impl Likelihood for Ensemble {
+impl Likelihood for EnsembleLikelihood {
     /// The predicted outputs stand for states.
     fn outline(&self) -> Outline {
         let signals = self.0.signals();

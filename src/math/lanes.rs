@@ -2,7 +2,8 @@
 
 #![allow(clippy::needless_range_loop)] // loops of known length become vectors
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+use super::number::{Condition, Number};
+use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// Number of computations side by side.
 pub const LANES: usize = 8;
@@ -25,19 +26,20 @@ macro_rules! operator {
                 self.zip(other, |a, b| a $sign b)
             }
         }
-        impl $Trait<f64> for Lanes {
-            type Output = Self;
-            #[inline(always)]
-            fn $name(self, other: f64) -> Self {
-                self.map(|a| a $sign other)
-            }
-        }
     };
 }
 operator!(Add add +);
 operator!(Sub sub -);
 operator!(Mul mul *);
 operator!(Div div /);
+
+impl Mul<f64> for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: f64) -> Self {
+        self.map(|a| a * other)
+    }
+}
 
 impl Neg for Lanes {
     type Output = Self;
@@ -55,100 +57,83 @@ impl AddAssign for Lanes {
 }
 
 impl Lanes {
-    /// Zero in each lane.
-    pub const ZERO: Self = Self::all(0.0);
-
-    /// The same number in each lane.
-    #[inline(always)]
-    pub const fn all(value: f64) -> Self {
-        Self([value; LANES])
-    }
-
     #[inline(always)]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {
-        let mut to = [0.0; LANES];
-        for i in 0..LANES {
-            to[i] = f(self.0[i]);
-        }
-        Self(to)
+        Self::of_lanes(|i| f(self.0[i]))
     }
 
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self::of_lanes(|i| f(self.0[i], other.0[i]))
+    }
+}
+
+impl Number for Lanes {
+    const ZERO: Self = Self([0.0; LANES]);
+    const LANES: usize = LANES;
+    type Condition = Mask;
+
+    #[inline(always)]
+    fn of_lanes(value: impl Fn(usize) -> f64) -> Self {
         let mut to = [0.0; LANES];
         for i in 0..LANES {
-            to[i] = f(self.0[i], other.0[i]);
+            to[i] = value(i);
         }
         Self(to)
     }
-
     #[inline(always)]
-    pub(crate) fn sqrt(self) -> Self {
+    fn lane(&self, lane: usize) -> f64 {
+        self.0[lane]
+    }
+    #[inline(always)]
+    fn lane_mut(&mut self, lane: usize) -> &mut f64 {
+        &mut self.0[lane]
+    }
+    #[inline(always)]
+    fn below(self, other: Self) -> Mask {
+        Mask::of(|i| self.0[i] < other.0[i])
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
         self.map(f64::sqrt)
     }
-
     #[inline(always)]
-    pub(crate) fn abs(self) -> Self {
+    fn abs(self) -> Self {
         self.map(f64::abs)
     }
-
-    #[inline(always)]
-    pub(crate) fn recip(self) -> Self {
-        self.map(|a| 1.0 / a)
-    }
-
     /// One lane after the other.
-    pub(crate) fn ln(self) -> Self {
+    fn ln(self) -> Self {
         self.map(f64::ln)
     }
-
     #[inline(always)]
-    pub(crate) fn exp(self) -> Self {
+    fn exp(self) -> Self {
         self.map(exp)
     }
-
-    /// The larger ones; `other` where this is NaN.
     #[inline(always)]
-    pub(crate) fn max(self, other: Self) -> Self {
+    fn max(self, other: Self) -> Self {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
-
-    /// The smaller ones; `other` where this is NaN.
     #[inline(always)]
-    pub(crate) fn min(self, other: Self) -> Self {
+    fn min(self, other: Self) -> Self {
         self.zip(other, |a, b| if a < b { a } else { b })
-    }
-
-    /// Lanes in which this is less than `other`.
-    #[inline(always)]
-    pub(crate) fn below(self, other: Self) -> Mask {
-        let mut mask = [0; LANES];
-        for i in 0..LANES {
-            mask[i] = if self.0[i] < other.0[i] { u64::MAX } else { 0 };
-        }
-        Mask(mask)
     }
 }
 
 impl Mask {
+    /// Lanes in which this holds.
     #[inline(always)]
-    pub(crate) fn of(lanes: [bool; LANES]) -> Self {
-        Self(lanes.map(|holds| if holds { u64::MAX } else { 0 }))
-    }
-
-    /// `yes` in the lanes of the mask, `no` in the others.
-    #[inline(always)]
-    pub(crate) fn select(self, yes: Lanes, no: Lanes) -> Lanes {
-        let mut to = [0.0; LANES];
+    pub(crate) fn of(holds: impl Fn(usize) -> bool) -> Self {
+        let mut mask = [0; LANES];
         for i in 0..LANES {
-            let (yes, no) = (yes.0[i].to_bits(), no.0[i].to_bits());
-            to[i] = f64::from_bits((self.0[i] & yes) | (!self.0[i] & no));
+            mask[i] = if holds(i) { u64::MAX } else { 0 };
         }
-        Lanes(to)
+        Self(mask)
     }
+}
 
+impl Condition<Lanes> for Mask {
     #[inline(always)]
-    pub(crate) fn any(self) -> bool {
+    fn any(self) -> bool {
         let mut any = 0;
         for bits in self.0 {
             any |= bits;
@@ -157,23 +142,40 @@ impl Mask {
     }
 
     #[inline(always)]
-    pub(crate) fn and(mut self, other: Self) -> Self {
+    fn select(self, yes: Lanes, no: Lanes) -> Lanes {
+        Lanes::of_lanes(|i| {
+            let (yes, no) = (yes.0[i].to_bits(), no.0[i].to_bits());
+            f64::from_bits((self.0[i] & yes) | (!self.0[i] & no))
+        })
+    }
+}
+
+impl BitAnd for Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(mut self, other: Self) -> Self {
         for i in 0..LANES {
             self.0[i] &= other.0[i];
         }
         self
     }
+}
 
+impl BitOr for Mask {
+    type Output = Self;
     #[inline(always)]
-    pub(crate) fn or(mut self, other: Self) -> Self {
+    fn bitor(mut self, other: Self) -> Self {
         for i in 0..LANES {
             self.0[i] |= other.0[i];
         }
         self
     }
+}
 
+impl Not for Mask {
+    type Output = Self;
     #[inline(always)]
-    pub(crate) fn not(mut self) -> Self {
+    fn not(mut self) -> Self {
         for i in 0..LANES {
             self.0[i] = !self.0[i];
         }

@@ -22,22 +22,13 @@ pub fn solve_truncated(
     right_side: &DVector<f64>,
     relative_cutoff: f64,
 ) -> Result<TruncatedSolution, MathError> {
-    solve_above(matrix, right_side, |largest| relative_cutoff * largest)
-}
-
-/// [`solve_truncated`] with the threshold as a function of the largest singular value.
-pub(crate) fn solve_above(
-    matrix: &DMatrix<f64>,
-    right_side: &DVector<f64>,
-    threshold: impl Fn(f64) -> f64,
-) -> Result<TruncatedSolution, MathError> {
     // The decomposition reports NaN by not converging; an infinity or a bad right side would pass silently.
     let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
     if !finite(matrix.as_slice()) || !finite(right_side.as_slice()) {
         return Err(MathError::NotFinite);
     }
     let svd = thin_svd(matrix).ok_or(MathError::NotFinite)?;
-    let threshold = threshold(svd.values.iter().copied().fold(0.0, f64::max));
+    let threshold = relative_cutoff * svd.values.iter().copied().fold(0.0, f64::max);
     let rank = svd
         .values
         .iter()

@@ -9,7 +9,7 @@ const SWEEPS: usize = 60;
 
 /// `A = U diag(σ) Vᵀ`, thin: with k = min(rows, columns), `left` is rows × k, `right` is columns × k, and
 /// `values` descend. A singular value of zero may have a vector of zeros on the longer side.
-pub(super) struct Svd {
+pub(crate) struct Svd {
     pub left: DMatrix<f64>,
     pub values: DVector<f64>,
     pub right: DMatrix<f64>,
@@ -20,7 +20,7 @@ pub(super) struct Svd {
 /// A tall matrix is brought to A = QR; then the columns of R are rotated in pairs until they are orthogonal (one-sided
 /// Jacobi). nalgebra's own decomposition is not used: it does not multiply back to a 30 × 20 matrix of rank 4 (off by
 /// as much as its entries), and among 5000 random 7 × 3 matrices was off by up to 6e-11, this one by 3e-15.
-pub(super) fn thin_svd(matrix: &DMatrix<f64>) -> Option<Svd> {
+pub(crate) fn thin_svd(matrix: &DMatrix<f64>) -> Option<Svd> {
     let (rows, columns) = matrix.shape();
     if matrix.iter().any(|v| !v.is_finite()) {
         return None;

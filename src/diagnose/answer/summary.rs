@@ -7,7 +7,7 @@ use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::Nuisance;
 use crate::fit::follow::starts;
-use crate::fit::posterior::Spread;
+use crate::fit::posterior::FitIntervals;
 use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::model::Model;
 use crate::hypothesis::set::TermSet;
@@ -97,7 +97,7 @@ pub(in crate::diagnose) fn parameters(
 ) -> Result<Vec<FittedParameter>, StudyError> {
     let noise = settings.noise().child("parameters");
     let level = Thresholds::INTERVAL_LEVEL;
-    let spread = Spread::drawn(&model.problem, &model.fitted, level, noise)?;
+    let spread = FitIntervals::drawn(&model.problem, &model.fitted, level, noise)?;
     let theta = model.theta();
     let space = model.base.parameters();
     let all = (space.iter().enumerate())

@@ -8,7 +8,7 @@ use crate::estimator::cloud::Cloud;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
 use crate::estimator::refine::{Refined, Refinement};
-use crate::fit::posterior::Region;
+use crate::fit::posterior::PosteriorRegion;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ impl Run<'_> {
         &self,
         simulator: &FeatureSimulator,
         initial: &[f64],
-        region: Option<&Region>,
+        region: Option<&PosteriorRegion>,
     ) -> Result<Refit, EstimatorError> {
         let (settings, progress) = (self.settings, self.progress);
         let lap = Instant::now();

@@ -1,41 +1,33 @@
 //! Evidence by importance sampling.
 
 use super::expansion::{Expansion, log_mean};
-use super::sizes::Block;
+use super::sizes::SizePrior;
 use crate::fit::axis::EvidencePrior;
-use crate::fit::posterior::{Proposal, Round, effective};
+use crate::fit::budget::BUDGET;
+use crate::fit::posterior::{PosteriorSample, Proposal, Round, effective};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::deviation;
 use crate::twin::Noise;
 use nalgebra::DVector;
 use std::f64::consts::{LN_2, TAU};
 
-/// Samples that are filtered in one round, and draws that makes at least and at most.
-const SAMPLES: usize = 400_000;
-const LEAST_DRAWS: usize = 200;
-const MOST_DRAWS: usize = 1000;
-/// Share of the first proposals' covariance in those that follow their draws.
-const KEPT: f64 = 0.05;
-/// Monte-Carlo error in nats that is small enough, and rounds for which more draws are taken at most.
-const ENOUGH: f64 = 0.03;
-const MOST_ROUNDS: usize = 4;
-
 impl Expansion<'_> {
     /// log Z from draws of proposals that follow the posterior, its standard error, and the effective number of draws.
     pub(super) fn by_draws(
         &self,
-        proposals: &[Proposal],
-        blocks: &[Block],
+        sample: &PosteriorSample,
+        blocks: &[SizePrior],
         noise: Noise,
     ) -> Result<Option<(f64, f64, f64)>, FilterError> {
-        let first: Vec<Proposal> = (proposals.iter())
+        let first: Vec<Proposal> = (sample.proposals.iter())
             .filter_map(|proposal| proposal.within(&self.free, &self.phi))
             .collect();
         if first.is_empty() {
             return Ok(None);
         }
         let mut proposals = first.clone();
-        let count = (SAMPLES / self.problem.samples()).clamp(LEAST_DRAWS, MOST_DRAWS);
+        let count = (BUDGET.evidence_samples / self.problem.samples())
+            .clamp(BUDGET.least_evidence_draws, BUDGET.most_evidence_draws);
         let log_target = |phi: &DVector<f64>| {
             let log_prior = self.log_prior(&phi.select_rows(&self.free), blocks);
             if log_prior == f64::NEG_INFINITY {
@@ -46,31 +38,42 @@ impl Expansion<'_> {
             Ok(value.map(|value| value + log_prior))
         };
         let mut source = noise.source("evidence");
-        let mut logs: Vec<f64> = vec![];
-        let mut found = None;
-        for _ in 0..MOST_ROUNDS {
+        let mut logs = self.reweighed(sample, blocks);
+        let mut found = mean_weight(&logs);
+        for _ in 0..BUDGET.evidence_rounds {
+            if found.is_some_and(|(_, error, _)| error <= BUDGET.evidence_error) {
+                break;
+            }
             let round = Round::new(self.problem, &proposals, count, &mut source, log_target)?;
-            proposals = round.adapted(&first, KEPT);
+            proposals = round.adapted(&first, BUDGET.kept_covariance);
             logs.extend(round.logs);
-            let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            if !top.is_finite() {
-                break;
-            }
-            let weights: Vec<f64> = logs.iter().map(|l| (l - top).exp()).collect();
-            let n = weights.len() as f64;
-            let mean = weights.iter().sum::<f64>() / n;
-            let error = deviation(&weights) / n.sqrt() / mean;
-            found = Some((top + mean.ln(), error, effective(&weights)));
-            if error <= ENOUGH {
-                break;
-            }
+            found = mean_weight(&logs);
         }
         let bounds = self.beyond_bounds(&self.problem.prior_terms().collect::<Vec<_>>());
         Ok(found.map(|(log, error, effective)| (log + bounds, error, effective)))
     }
 
+    /// log of likelihood·prior/proposal at the draws of the posterior, whose likelihoods are known; none where entries at a bound were drawn,
+    /// too.
+    fn reweighed(&self, sample: &PosteriorSample, blocks: &[SizePrior]) -> Vec<f64> {
+        let Some(round) = sample.round.as_ref().filter(|r| r.free == self.free) else {
+            return vec![];
+        };
+        let draws = round.draws.iter().zip(&round.logs);
+        draws
+            .map(|(phi, log)| {
+                if *log == f64::NEG_INFINITY {
+                    return *log;
+                }
+                let theta = self.problem.coordinates.theta(phi.as_slice());
+                let weak = self.problem.log_prior(&theta, true);
+                log - weak + self.log_prior(&phi.select_rows(&self.free), blocks)
+            })
+            .collect()
+    }
+
     /// log of the prior density of the free entries.
-    fn log_prior(&self, phi: &DVector<f64>, blocks: &[Block]) -> f64 {
+    fn log_prior(&self, phi: &DVector<f64>, blocks: &[SizePrior]) -> f64 {
         let prior: Vec<(f64, f64)> = self.problem.prior_terms().collect();
         let normal = |v: f64, mean: f64, precision: f64| {
             0.5 * (precision / TAU).ln() - 0.5 * precision * (v - mean).powi(2)
@@ -107,4 +110,17 @@ impl Expansion<'_> {
             .sum();
         of_entries + of_blocks
     }
+}
+
+/// log of the mean weight, its standard error, and the effective number of draws; `None` where no draw has any weight.
+fn mean_weight(logs: &[f64]) -> Option<(f64, f64, f64)> {
+    let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !top.is_finite() {
+        return None;
+    }
+    let weights: Vec<f64> = logs.iter().map(|l| (l - top).exp()).collect();
+    let n = weights.len() as f64;
+    let mean = weights.iter().sum::<f64>() / n;
+    let error = deviation(&weights) / n.sqrt() / mean;
+    Some((top + mean.ln(), error, effective(&weights)))
 }

@@ -1,6 +1,6 @@
 //! The posterior around a fit, to second order.
 
-use super::sizes::Block;
+use super::sizes::SizePrior;
 use crate::fit::axis::EvidencePrior;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
@@ -70,12 +70,12 @@ impl<'a> Expansion<'a> {
     }
 
     /// Magnitudes among the free entries, with the sizes that count.
-    pub(super) fn blocks(&self) -> Vec<Block> {
-        Block::all(self.problem, &self.free, &self.information)
+    pub(super) fn blocks(&self) -> Vec<SizePrior> {
+        SizePrior::all(self.problem, &self.free, &self.information)
     }
 
     /// Laplace over all sizes: log Z, and the approximation at the most probable sizes.
-    pub(super) fn laplace(&self, blocks: &[Block]) -> Option<(f64, Laplace)> {
+    pub(super) fn laplace(&self, blocks: &[SizePrior]) -> Option<(f64, Laplace)> {
         let mut chosen: Vec<usize> = blocks.iter().map(|b| b.options.len() / 2).collect();
         let values = |chosen: &[usize], b: usize| -> Vec<f64> {
             let mut tried = chosen.to_vec();
@@ -114,7 +114,7 @@ impl<'a> Expansion<'a> {
     }
 
     /// Laplace with these sizes of the magnitudes.
-    fn at_sizes(&self, blocks: &[Block], chosen: &[usize]) -> Option<Laplace> {
+    fn at_sizes(&self, blocks: &[SizePrior], chosen: &[usize]) -> Option<Laplace> {
         let d = self.free.len();
         let prior = self.problem.prior_terms().collect::<Vec<_>>();
         // Mean and precision of the prior, and log of its density at the centre.

@@ -10,8 +10,8 @@
 //! normal prior whose deviation τ is unknown: six values from what is just visible to what is as large as the twin's own terms.
 //! An unfinished fit is credited with 1.5 nats of what its quadratic promises, no more.
 //!
-//! Laplace is exact for a normal posterior. Draws correct the rest: Z = mean of likelihood·prior/proposal, the proposals those that
-//! follow the posterior draws.
+//! Laplace is exact for a normal posterior. Draws correct the rest: Z = mean of likelihood·prior/proposal, first over the draws of the
+//! posterior, whose likelihoods are known.
 //!
 //! Sources: MacKay, *Information Theory, Inference, and Learning Algorithms* (2003), chapters 27 to 29; Kass & Raftery, "Bayes factors",
 //! *JASA* 90 (1995).
@@ -25,14 +25,12 @@ mod tests;
 pub(crate) use expansion::{CREDIT, Laplace, log_mean};
 
 use super::climb::Fitted;
-use super::posterior::Proposal;
+use super::posterior::PosteriorSample;
 use super::problem::Problem;
+use crate::fit::budget::BUDGET;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use expansion::Expansion;
-
-/// Effective draws below which the correction says less than Laplace.
-const LEAST_EFFECTIVE: f64 = 30.0;
 
 /// Evidence, in nats.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,11 +56,12 @@ pub(crate) fn laplace(problem: &Problem, fitted: &Fitted, credit: f64) -> Option
 
 /// Evidence of a twin around the fit that maximises it.
 ///
-/// Draws of `proposals` correct what Laplace leaves; without any, and for simulated likelihoods, Laplace stands alone.
+/// Draws of the posterior correct what Laplace leaves, and more of their proposals where these are too few; without any, and for simulated
+/// likelihoods, Laplace stands alone.
 pub(super) fn evidence(
     problem: &Problem,
     fitted: &Fitted,
-    proposals: &[Proposal],
+    sample: &PosteriorSample,
     noise: Noise,
 ) -> Result<Option<Evidence>, FilterError> {
     let expansion = Expansion::new(problem, fitted);
@@ -79,10 +78,10 @@ pub(super) fn evidence(
     if problem.is_simulated() {
         return Ok(Some(alone));
     }
-    let Some((log, error, effective)) = expansion.by_draws(proposals, &blocks, noise)? else {
+    let Some((log, error, effective)) = expansion.by_draws(sample, &blocks, noise)? else {
         return Ok(Some(alone));
     };
-    Ok(Some(if effective >= LEAST_EFFECTIVE {
+    Ok(Some(if effective >= BUDGET.effective_draws {
         Evidence {
             log_evidence: log,
             laplace,

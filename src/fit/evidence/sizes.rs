@@ -8,12 +8,12 @@ use nalgebra::DMatrix;
 const SIZES: usize = 6;
 
 /// Magnitudes that share one prior, and the deviations that it may give each of them.
-pub(super) struct Block {
+pub(super) struct SizePrior {
     pub(super) entries: Vec<usize>,
     pub(super) options: Vec<Vec<f64>>,
 }
 
-impl Block {
+impl SizePrior {
     /// Deviation that an option gives an entry, if it is one of these.
     pub(super) fn deviation(&self, option: usize, entry: usize) -> Option<f64> {
         let at = self.entries.iter().position(|j| *j == entry)?;

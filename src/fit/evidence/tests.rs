@@ -5,7 +5,7 @@ use super::*;
 use crate::fit::axis::Axis;
 use crate::fit::axis::EvidencePrior;
 use crate::fit::climb::climb;
-use crate::fit::posterior::posterior;
+use crate::fit::posterior::{PosteriorSample, posterior};
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Now, Outline, Parameter, StateSpace, Twin};
 use nalgebra::{DMatrix, DVector};
@@ -74,7 +74,7 @@ fn problem(records: &[Record], size: Option<f64>) -> Problem {
 fn corrected(problem: &Problem, fitted: &Fitted, seed: u64) -> Evidence {
     let noise = Noise::new(seed, "t", 0);
     let draws = posterior(problem, std::slice::from_ref(fitted), None, noise).unwrap();
-    let found = evidence(problem, fitted, &draws.proposals, noise).unwrap();
+    let found = evidence(problem, fitted, &draws, noise).unwrap();
     found.unwrap()
 }
 
@@ -120,7 +120,7 @@ fn sizes_are_averaged_over() {
     let each: Vec<f64> = (blocks[0].options.iter())
         .map(|size| exact(&records[0], [deviation.powi(2), size[0] * size[0]]))
         .collect();
-    let found = evidence(&problem, &fitted, &[], Noise::OFF)
+    let found = evidence(&problem, &fitted, &PosteriorSample::default(), Noise::OFF)
         .unwrap()
         .unwrap();
     assert!(
@@ -142,7 +142,7 @@ fn an_entry_at_its_bound_is_integrated_on_one_side() {
     problem = Problem::new(problem.twin.clone(), axes, records.clone());
     let fitted = climb(&problem, &[0.0, 0.0], 40).unwrap().unwrap();
     assert_eq!(fitted.theta[1], 0.5);
-    let found = evidence(&problem, &fitted, &[], Noise::OFF)
+    let found = evidence(&problem, &fitted, &PosteriorSample::default(), Noise::OFF)
         .unwrap()
         .unwrap();
     // By quadrature over b, a in closed form.

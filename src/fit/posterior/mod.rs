@@ -14,9 +14,9 @@ mod sampler;
 mod spread;
 mod table;
 
-pub(crate) use region::Region;
-pub(crate) use resampling::{Draws, posterior};
+pub(crate) use region::PosteriorRegion;
+pub(crate) use resampling::{PosteriorSample, posterior};
 pub(in crate::fit) use sampler::{Proposal, Round, effective};
-pub(crate) use spread::Spread;
+pub(crate) use spread::FitIntervals;
 pub use table::Posterior;
 pub(in crate::fit) use table::table;

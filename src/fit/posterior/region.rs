@@ -1,14 +1,12 @@
-//! Where the records put θ.
+//! Region of θ that the records leave.
 
-use super::resampling::Draws;
+use super::resampling::PosteriorSample;
+use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
 use crate::math::{principal_axes, solve_truncated};
 use crate::twin::Role;
 use nalgebra::{DMatrix, DVector};
-
-/// Draws for each parameter that a covariance needs.
-const DRAWS_EACH: usize = 10;
 
 /// Length of an axis over the longest at which it is none: a start that is known, say.
 const LEAST_AXIS: f64 = 1e-9;
@@ -19,21 +17,21 @@ const LEAST_SHARE: f64 = 0.05;
 
 /// Mean and principal axes of the posterior of the twin's own parameters.
 #[derive(Debug, Clone)]
-pub(crate) struct Region {
+pub(crate) struct PosteriorRegion {
     /// Mean.
     pub theta: Vec<f64>,
     /// Columns: principal axes of the covariance, one standard deviation long, in the units of θ.
     pub axes: DMatrix<f64>,
 }
 
-impl Region {
+impl PosteriorRegion {
     /// Region of the first `own` entries of θ of the first record, from the draws; to first order about the best top, where these are few.
     /// A first state that the likelihood integrates is what `start` says of it: mean and deviation. `None` where nothing is estimated, or
     /// the covariance is not finite.
     pub fn new(
         problem: &Problem,
         fitted: &Fitted,
-        draws: &Draws,
+        draws: &PosteriorSample,
         start: impl Fn(&str) -> Option<(f64, f64)>,
         own: usize,
     ) -> Option<Self> {
@@ -47,7 +45,7 @@ impl Region {
             .filter(|(_, mode)| counts(**mode))
             .map(|(theta, _)| DVector::from_column_slice(&theta[..own]))
             .collect();
-        let (mut mean, mut covariance) = match about.len() >= DRAWS_EACH * own {
+        let (mut mean, mut covariance) = match about.len() >= BUDGET.region_draws * own {
             true => moments(&about),
             false => first_order(problem, fitted, own),
         };
@@ -128,12 +126,12 @@ mod tests {
         let fitted = climb(&problem, &[1.5], 10).unwrap().unwrap();
         let near = (0..58).map(|i| (1.0 + 0.01 * f64::from(i % 2), 1));
         let (values, modes): (Vec<f64>, _) = near.chain([(4.0, 0); 2]).unzip();
-        let draws = Draws {
+        let draws = PosteriorSample {
             thetas: values.into_iter().map(|nu| vec![nu]).collect(),
             modes,
-            ..Draws::default()
+            ..PosteriorSample::default()
         };
-        let region = Region::new(&problem, &fitted, &draws, |_| None, 1).unwrap();
+        let region = PosteriorRegion::new(&problem, &fitted, &draws, |_| None, 1).unwrap();
         assert!((region.theta[0] - 1.005).abs() < 1e-9);
         assert!((region.std_errors()[0] - 0.005).abs() < 1e-9);
         assert!((region.squared_distance(&[1.015]) - 4.0).abs() < 1e-6);

@@ -1,32 +1,16 @@
 //! Draws of θ given the records.
 
 use super::sampler::{Proposal, Round};
+use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Noise;
 use nalgebra::DVector;
 
-/// Samples that are filtered in one round, and draws that makes at least and at most.
-const SAMPLES: usize = 200_000;
-const LEAST: usize = 100;
-const MOST: usize = 500;
-/// Draws of the last round for each that is asked for: weights are uneven, and fewer would repeat draws.
-const OVER: usize = 4;
-/// Rounds of adaptation where draws are asked for; without, one.
-const ROUNDS: usize = 3;
-/// Share of the first round's covariance in that of the next.
-const KEPT: f64 = 0.05;
-/// Nats below the best top within which another counts: a mode with a thousandth of the mass is none.
-const DEEP: f64 = 7.0;
-/// Standard deviations between two tops of their own.
-const APART: f64 = 3.0;
-/// Gain in nats at which a draw is better than the fit.
-const BETTER: f64 = 0.1;
-
 /// Draws of the full θ, the weights of their round already followed.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Draws {
+pub(crate) struct PosteriorSample {
     /// Full θ of each draw.
     pub thetas: Vec<Vec<f64>>,
     /// Top that each draw belongs to.
@@ -35,13 +19,15 @@ pub(crate) struct Draws {
     pub effective: f64,
     /// Densities about the tops that follow the draws.
     pub(in crate::fit) proposals: Vec<Proposal>,
+    /// The last round, before draws are taken from it.
+    pub(in crate::fit) round: Option<Round>,
     /// The best draw, where it is better than the best fit.
     pub(in crate::fit) better: Option<Vec<f64>>,
 }
 
 /// Number of draws whose time is that of a fit.
 pub(in crate::fit) fn usual(problem: &Problem) -> usize {
-    (SAMPLES / problem.samples()).clamp(LEAST, MOST)
+    (BUDGET.round_samples / problem.samples()).clamp(BUDGET.least_draws, BUDGET.most_draws)
 }
 
 /// `count` draws of θ, or as many as fits need, from the posterior of likelihood and weak priors within the bounds; `fits` are ends of
@@ -56,9 +42,9 @@ pub(crate) fn posterior(
     fits: &[Fitted],
     count: Option<usize>,
     noise: Noise,
-) -> Result<Draws, FilterError> {
+) -> Result<PosteriorSample, FilterError> {
     let Some(best) = fits.first() else {
-        return Ok(Draws::default());
+        return Ok(PosteriorSample::default());
     };
     let usual = usual(problem);
     let mut source = noise.source("draws");
@@ -66,7 +52,7 @@ pub(crate) fn posterior(
         .filter_map(|fit| Proposal::around(problem, fit))
         .collect();
     if first.is_empty() {
-        return Ok(Draws::default());
+        return Ok(PosteriorSample::default());
     }
     let c = &problem.coordinates;
     let log_posterior = |phi: &DVector<f64>| {
@@ -75,12 +61,12 @@ pub(crate) fn posterior(
         Ok(value.map(|l| l + problem.log_prior(&theta, true)))
     };
     let (rounds, size) = match count {
-        Some(count) => (ROUNDS, usual.max(OVER * count)),
+        Some(count) => (BUDGET.adaptations, usual.max(BUDGET.draws_each * count)),
         None => (1, usual),
     };
     let mut proposals = first.clone();
     let mut round = Round::new(problem, &proposals, usual, &mut source, log_posterior)?;
-    let mut better = (best.objective + BETTER, None);
+    let mut better = (best.objective + BUDGET.better_draw, None);
     let mut look = |round: &Round| {
         if let Some((phi, value)) = round.best()
             && value > better.0
@@ -90,19 +76,20 @@ pub(crate) fn posterior(
     };
     look(&round);
     for left in (0..rounds).rev() {
-        proposals = round.adapted(&first, KEPT);
+        proposals = round.adapted(&first, BUDGET.kept_covariance);
         let size = if left == 0 { size } else { usual };
         round = Round::new(problem, &proposals, size, &mut source, log_posterior)?;
         look(&round);
     }
     let taken = round.taken(count.unwrap_or(usual));
     let theta = |i: &usize| c.theta(round.draws[*i].as_slice());
-    Ok(Draws {
+    Ok(PosteriorSample {
         thetas: taken.iter().map(theta).collect(),
         modes: taken.iter().map(|i| round.modes[*i]).collect(),
         effective: round.effective(),
-        proposals: round.adapted(&first, KEPT),
+        proposals: round.adapted(&first, BUDGET.kept_covariance),
         better: better.1,
+        round: Some(round),
     })
 }
 
@@ -113,9 +100,9 @@ fn tops<'a>(problem: &Problem, fits: &'a [Fitted]) -> Vec<&'a Fitted> {
     for fit in fits {
         let is_apart = |top: &&Fitted| {
             let off = DVector::from_vec(c.of(&fit.theta)) - DVector::from_vec(c.of(&top.theta));
-            off.dot(&(&top.information * &off)) > APART * APART
+            off.dot(&(&top.information * &off)) > BUDGET.tops_apart * BUDGET.tops_apart
         };
-        if fit.objective > fits[0].objective - DEEP && tops.iter().all(is_apart) {
+        if fit.objective > fits[0].objective - BUDGET.counting_top && tops.iter().all(is_apart) {
             tops.push(fit);
         }
     }

@@ -2,6 +2,7 @@
 //!
 //! Source: Cappé, Guillin, Marin & Robert, "Population Monte Carlo" (2004).
 
+use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
@@ -12,8 +13,6 @@ use std::f64::consts::PI;
 
 /// Degrees of freedom of a proposal: heavier tails than a posterior's.
 const FREEDOM: usize = 5;
-/// Draws that count, for each entry of φ: weights are flattened until so many do, so that a proposal follows more than a few draws.
-const COUNTING: f64 = 4.0;
 
 /// A Student density about one top, in the entries of φ that may move.
 #[derive(Debug, Clone)]
@@ -97,6 +96,7 @@ impl Proposal {
 }
 
 /// Draws in φ from equal parts of several proposals.
+#[derive(Debug, Clone)]
 pub(in crate::fit) struct Round {
     pub draws: Vec<DVector<f64>>,
     /// Proposal that each draw belongs to.
@@ -107,7 +107,8 @@ pub(in crate::fit) struct Round {
     pub logs: Vec<f64>,
     /// Target over proposal, over the largest.
     weights: Vec<f64>,
-    free: Vec<usize>,
+    /// Entries that may move.
+    pub free: Vec<usize>,
 }
 
 impl Round {
@@ -184,7 +185,10 @@ impl Round {
             .map(|i| (&self.draws[i], self.weights[i]))
             .collect();
         let d = self.free.len();
-        let weights = flattened(own.iter().map(|(_, w)| *w).collect(), COUNTING * d as f64)?;
+        let weights = flattened(
+            own.iter().map(|(_, w)| *w).collect(),
+            BUDGET.counting_draws * d as f64,
+        )?;
         let sum: f64 = weights.iter().sum();
         let own: Vec<_> = own.iter().map(|(x, _)| *x).zip(&weights).collect();
         let zeros = DVector::zeros(own.first()?.0.len());

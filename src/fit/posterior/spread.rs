@@ -1,6 +1,7 @@
 //! Standard errors and intervals of a fit.
 
-use super::resampling::{Draws, posterior, usual};
+use super::resampling::{PosteriorSample, posterior, usual};
+use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
@@ -8,17 +9,14 @@ use crate::math::{deviation, quantile};
 use crate::twin::Noise;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Different posterior draws that intervals need: three of them lie beyond an end at 0.9.
-const LEAST_DRAWS: usize = 60;
-
 /// Standard errors and intervals of θ of the first record.
-pub(crate) struct Spread {
+pub(crate) struct FitIntervals {
     pub errors: Vec<f64>,
     pub low: Vec<f64>,
     pub high: Vec<f64>,
 }
 
-impl Spread {
+impl FitIntervals {
     /// From posterior draws around a fit; of a simulated likelihood, whose draws would cost ensembles, to first order.
     pub fn drawn(
         problem: &Problem,
@@ -27,7 +25,7 @@ impl Spread {
         noise: Noise,
     ) -> Result<Self, FilterError> {
         let draws = match problem.is_simulated() {
-            true => Draws::default(),
+            true => PosteriorSample::default(),
             false => {
                 // With fewer rounds, deviations of a clipped record differ by a seventh from one set of units to another.
                 let count = Some(usual(problem));
@@ -46,7 +44,7 @@ impl Spread {
             .collect();
         first.sort_unstable();
         first.dedup();
-        if first.len() >= LEAST_DRAWS {
+        if first.len() >= BUDGET.interval_draws {
             let columns: Vec<Vec<f64>> = (0..d)
                 .map(|j| draws.iter().map(|theta| theta[j]).collect())
                 .collect();

@@ -1,6 +1,6 @@
 //! Posterior draws of everything unknown, as a table.
 
-use super::resampling::Draws;
+use super::resampling::PosteriorSample;
 use crate::fit::problem::{Problem, of_record};
 use crate::likelihood::kalman::{FilterError, States};
 use crate::math::to_matrix;
@@ -58,7 +58,7 @@ impl Posterior {
 /// Names and values of the draws; the first states of equations are drawn given θ and the records.
 pub(in crate::fit) fn table(
     problem: &Problem,
-    draws: &Draws,
+    draws: &PosteriorSample,
     noise: Noise,
 ) -> Result<Posterior, FilterError> {
     let space = problem.twin.parameters();

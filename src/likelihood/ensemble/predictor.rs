@@ -12,7 +12,7 @@
 //! About linear dynamics around the mean run this is what a Kalman filter does, its gain read off the runs, row by row; what is
 //! not linear within the scatter of the runs widens Σ. Rare large errors make the density a Student's (`tail.rs`).
 
-use super::row::{Row, row};
+use super::row::{RowPrediction, row};
 use super::runs::Ensemble;
 use super::tail::Tail;
 use crate::likelihood::kalman::Filtered;
@@ -38,7 +38,7 @@ const ALIVE: f64 = 1e-3;
 pub(crate) struct Predictor {
     mean: Signal,
     runs: f64,
-    rows: Vec<Row>,
+    rows: Vec<RowPrediction>,
     tail: Tail,
 }
 
@@ -50,7 +50,7 @@ impl Predictor {
         let m = ensemble.runs;
         let lags = LAGS.min(m / RUNS_EACH / p).max(1);
         let floors = floors(record);
-        let mut rows: Vec<Row> = (0..ensemble.mean.nrows())
+        let mut rows: Vec<RowPrediction> = (0..ensemble.mean.nrows())
             .map(|k| {
                 let past = (1..=lags.min(k)).flat_map(|lag| (0..p).map(move |j| (k - lag, j)));
                 let known = past.filter(|&(k, j)| !outputs[[k, j]].is_nan()).collect();
@@ -122,7 +122,7 @@ pub(super) fn floors(record: &Record) -> Vec<f64> {
 }
 
 /// Least variance of output j in a row.
-fn least(rows: &[Row], j: usize) -> f64 {
+fn least(rows: &[RowPrediction], j: usize) -> f64 {
     let all = || rows.iter().map(|row| row.covariance[(j, j)]);
     let largest = all().fold(0.0, f64::max);
     let alive: Vec<f64> = all().filter(|s| *s >= ALIVE * largest).collect();

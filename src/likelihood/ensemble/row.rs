@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 /// Regression of one row on the rows before it.
 #[derive(Debug, Clone)]
-pub(super) struct Row {
+pub(super) struct RowPrediction {
     /// Outputs that it is predicted from, by row before it and channel.
     pub past: Vec<(usize, usize)>,
     /// B, transposed: outputs × regressors.
@@ -17,7 +17,12 @@ pub(super) struct Row {
 }
 
 /// Fits row `k` to outputs of rows before it.
-pub(super) fn row(ensemble: &Ensemble, k: usize, past: Vec<(usize, usize)>, floors: &[f64]) -> Row {
+pub(super) fn row(
+    ensemble: &Ensemble,
+    k: usize,
+    past: Vec<(usize, usize)>,
+    floors: &[f64],
+) -> RowPrediction {
     let p = ensemble.outputs();
     let m = ensemble.runs as f64;
     let n = past.len();
@@ -52,7 +57,7 @@ pub(super) fn row(ensemble: &Ensemble, k: usize, past: Vec<(usize, usize)>, floo
     for j in 0..p {
         covariance[(j, j)] = covariance[(j, j)].max(floors[j]);
     }
-    Row {
+    RowPrediction {
         weights: along.tr_mul(&whitening),
         whitening,
         covariance,

@@ -7,7 +7,7 @@
 //!
 //! A Student's density of unit variance has excess kurtosis 6/(ν − 4). The ½ keeps what is normal up to chance normal.
 
-use super::row::Row;
+use super::row::RowPrediction;
 use super::runs::Ensemble;
 use nalgebra::DVector;
 use statrs::function::gamma::ln_gamma;
@@ -28,7 +28,7 @@ pub(crate) enum Tail {
 
 impl Tail {
     /// Estimates the tail from the runs' own residuals, in rows of more than the least variance.
-    pub fn of(ensemble: &Ensemble, rows: &[Row], least: &[f64]) -> Self {
+    pub fn of(ensemble: &Ensemble, rows: &[RowPrediction], least: &[f64]) -> Self {
         let p = ensemble.outputs();
         let (mut squares, mut fourths, mut count) = (0.0, 0.0, 0.0);
         let mut residual = vec![0.0; ensemble.runs];

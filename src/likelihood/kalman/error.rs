@@ -1,10 +1,10 @@
-//! Why a record could not be filtered.
+//! Errors of a filter.
 use crate::math::MathError;
 use crate::record::RecordError;
 use crate::setting::{SettingError, number};
 use crate::twin::{SimulationError, TwinError};
 
-/// Why a record could not be filtered. [`Diverged`](Self::Diverged), [`NoSpread`](Self::NoSpread) and a twin that
+/// Error of a filter. [`Diverged`](Self::Diverged), [`NoSpread`](Self::NoSpread) and a twin that
 /// refuses θ cost this θ alone; the rest ends the work.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -2,7 +2,7 @@
 
 use super::gaussian::{Belief, Gaussian};
 use super::order::Order;
-use super::pass::{Bound, Innovation, Pass, Sink};
+use super::pass::{Innovation, Pass, Sink};
 use super::size::Any;
 use super::{FilterError, Kalman};
 use crate::record::Signal;
@@ -188,7 +188,7 @@ impl Kalman<'_> {
         let mut filtered = Filtered::new(self.record.samples(), self.channels, states);
         filtered.log_likelihood = self.run(theta, &mut filtered)?;
         if let Some(states) = &mut filtered.states {
-            states.map(|state| self.told(state));
+            states.map(|state| self.held_in_limits(state));
         }
         Ok(filtered)
     }
@@ -224,13 +224,8 @@ impl Kalman<'_> {
         to: &mut Predictions,
     ) -> Result<(), FilterError> {
         to.skipped = (0..self.channels).map(|j| order.is_late(j)).collect();
-        let acting = self.acting(theta)?;
-        let on = Bound {
-            kalman: self,
-            acting: &acting,
-            order: &order.punctual(self),
-            theta,
-        };
+        let punctual = order.punctual(self);
+        let jobs = &[self.job(&punctual, theta)?];
         let size = Any {
             states: self.states,
             outputs: self.channels,
@@ -240,7 +235,7 @@ impl Kalman<'_> {
             let shown = first.checked_sub(block + 1);
             let from = shown.map(|k| (k, states[k].as_belief()));
             to.first = first;
-            Pass::new(size, &on).run_from(from, (first + block).min(samples), to)?;
+            Pass::new(size, jobs).run_from(from, (first + block).min(samples), to)?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! A mean and a covariance that may be singular.
 
-use super::size::Numbers;
-use crate::math::{Kernel, widest};
+use super::size::Buffer;
+use crate::math::{Condition, Kernel, Number, widest};
 
 /// Pivots below this share of their variance are rounding.
 const RELATIVE_PIVOT: f64 = 1e-15;
@@ -40,27 +40,27 @@ impl Gaussian {
 
 /// A look at a mean and a covariance.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Belief<'w> {
-    pub mean: &'w [f64],
-    pub cov: &'w [f64],
+pub(super) struct Belief<'w, N = f64> {
+    pub mean: &'w [N],
+    pub cov: &'w [N],
 }
 
 /// A root of a covariance: columns L_j with P = Σ L_j L_jᵀ, one after the other.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Columns<'w> {
-    pub all: &'w [f64],
+pub(super) struct Columns<'w, N = f64> {
+    pub all: &'w [N],
     pub rank: usize,
 }
 
-impl<'w> Columns<'w> {
+impl<'w, N> Columns<'w, N> {
     /// As many as states.
     #[inline(always)]
-    pub fn all(n: usize, all: &'w [f64]) -> Self {
+    pub fn all(n: usize, all: &'w [N]) -> Self {
         Self { all, rank: n }
     }
 
     #[inline(always)]
-    pub fn each(self, n: usize) -> std::slice::ChunksExact<'w, f64> {
+    pub fn each(self, n: usize) -> std::slice::ChunksExact<'w, N> {
         self.all[..self.rank * n].chunks_exact(n)
     }
 }
@@ -68,7 +68,7 @@ impl<'w> Columns<'w> {
 /// Cholesky's columns of a covariance (n × n, row-major) whose pivots are all above rounding; whether they are. No
 /// square root waits for another.
 #[inline(always)]
-pub(super) fn regular(mean: &[f64], cov: &[f64], columns: &mut [f64]) -> bool {
+pub(super) fn regular<N: Number>(mean: &[N], cov: &[N], columns: &mut [N]) -> bool {
     let n = mean.len();
     let (cov, columns) = (&cov[..n * n], &mut columns[..n * n]);
     let mut regular = true;
@@ -78,7 +78,7 @@ pub(super) fn regular(mean: &[f64], cov: &[f64], columns: &mut [f64]) -> bool {
         for i in j..n {
             let mut entry = cov[i * n + j];
             for k in 0..j {
-                entry -= columns[k * n + i] * columns[j * n + k];
+                entry = entry - columns[k * n + i] * columns[j * n + k];
             }
             columns[j * n + i] = entry;
             if i > j {
@@ -86,25 +86,26 @@ pub(super) fn regular(mean: &[f64], cov: &[f64], columns: &mut [f64]) -> bool {
             }
         }
         // Not so where it is NaN.
-        regular &= columns[j * n + j] > least_pivot(mean[j], variance);
+        let counts = least_pivot(mean[j], variance).below(columns[j * n + j]);
+        regular &= !(!counts).any();
     }
     for j in 0..n {
         let root = columns[j * n + j].sqrt();
         columns[j * n + j] = root;
         for i in j + 1..n {
             columns[j * n + i] = columns[i * n + j] * root;
-            columns[i * n + j] = 0.0;
+            columns[i * n + j] = N::ZERO;
         }
     }
     regular
 }
 
 #[inline(always)]
-fn least_pivot(mean: f64, variance: f64) -> f64 {
-    RELATIVE_PIVOT * variance + ABSOLUTE_PIVOT * mean * mean
+fn least_pivot<N: Number>(mean: N, variance: N) -> N {
+    variance * RELATIVE_PIVOT + mean * mean * ABSOLUTE_PIVOT
 }
 
-/// Cholesky's columns, without those whose pivot is zero.
+/// Cholesky's columns, without those whose pivot is zero; lanes keep them, as zeros.
 ///
 /// A state known exactly has no column, and so costs no point. Pivots count as zero where they are rounding: far below the
 /// noise floor, so that a state measured without noise keeps what it is known by.
@@ -114,27 +115,46 @@ pub(super) struct Root<M = Vec<f64>> {
     rank: usize,
 }
 
-impl<M: Numbers> Root<M> {
-    pub fn new(n: usize) -> Self {
+impl<M> Root<M> {
+    #[inline(always)]
+    pub fn new<N: Number>(n: usize) -> Self
+    where
+        M: Buffer<N>,
+    {
         Self {
             all: M::zeros(n * n),
             rank: 0,
         }
     }
 
-    pub fn columns(&self) -> Columns<'_> {
+    #[inline(always)]
+    pub fn columns<N: Number>(&self) -> Columns<'_, N>
+    where
+        M: Buffer<N>,
+    {
         Columns {
-            all: self.all.as_ref(),
+            all: self.all.numbers(),
             rank: self.rank,
         }
     }
 
     /// Factors a covariance (n × n, row-major).
-    pub fn factor(&mut self, mean: &[f64], cov: &[f64]) {
-        let all = self.all.as_mut();
-        self.rank = widest(Factor { mean, cov, all });
+    #[inline(always)]
+    pub fn factor<N: Number>(&mut self, mean: &[N], cov: &[N])
+    where
+        M: Buffer<N>,
+    {
+        let all = self.all.numbers_mut();
+        let factor = Factor { mean, cov, all };
+        // Lanes run in the widest vectors already.
+        self.rank = match N::LANES {
+            1 => widest(factor),
+            _ => factor.run(),
+        };
     }
+}
 
+impl Root {
     /// A solution of P·x = b in place, for b in the range of P; components without a pivot become zero.
     pub fn solve(&self, b: &mut [f64]) {
         let n = b.len();
@@ -162,13 +182,13 @@ impl<M: Numbers> Root<M> {
 }
 
 /// Columns of a root, one after the other; their number.
-struct Factor<'w> {
-    mean: &'w [f64],
-    cov: &'w [f64],
-    all: &'w mut [f64],
+struct Factor<'w, N> {
+    mean: &'w [N],
+    cov: &'w [N],
+    all: &'w mut [N],
 }
 
-impl Kernel for Factor<'_> {
+impl<N: Number> Kernel for Factor<'_, N> {
     type Output = usize;
 
     #[inline(always)]
@@ -179,7 +199,7 @@ impl Kernel for Factor<'_> {
         for j in 0..n {
             let (done, rest) = all.split_at_mut(rank * n);
             let column = &mut rest[..n];
-            column[..j].fill(0.0);
+            column[..j].fill(N::ZERO);
             for i in j..n {
                 column[i] = cov[i * n + j];
             }
@@ -187,17 +207,18 @@ impl Kernel for Factor<'_> {
             for before in done.chunks_exact(n) {
                 let share = before[j];
                 for (entry, before) in column[j..].iter_mut().zip(&before[j..]) {
-                    *entry -= before * share;
+                    *entry = *entry - *before * share;
                 }
             }
             let pivot = column[j];
-            // Also where it is NaN: that shows in the innovation.
-            if pivot.is_nan() || pivot <= least_pivot(mean[j], cov[j * n + j]) {
+            // Not so where it is NaN: that shows in the innovation.
+            let counts = least_pivot(mean[j], cov[j * n + j]).below(pivot);
+            if N::LANES == 1 && !counts.any() {
                 continue;
             }
-            let inverse = 1.0 / pivot.sqrt();
+            let inverse = counts.select(pivot, N::all(1.0)).sqrt().recip();
             for entry in &mut column[j..] {
-                *entry *= inverse;
+                *entry = counts.select(*entry * inverse, N::ZERO);
             }
             rank += 1;
         }
@@ -216,7 +237,7 @@ mod tests {
 
     fn product(root: &Root, n: usize) -> Vec<f64> {
         let mut all = vec![0.0; n * n];
-        for column in root.columns().each(n) {
+        for column in root.columns::<f64>().each(n) {
             for i in 0..n {
                 for j in 0..n {
                     all[i * n + j] += column[i] * column[j];

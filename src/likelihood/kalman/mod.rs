@@ -40,16 +40,18 @@
 //! a mixture, rounding ([`StateSpace::rounding`](crate::twin::StateSpace::rounding)) its mean over a cell; what follows from either for the
 //! state is again a mean and a covariance.
 
-mod bound;
+mod beside;
+
 mod coordinates;
 mod error;
+mod filter;
 mod filtered;
 mod gaussian;
-mod lanes;
 mod likelihood;
 mod linearised;
 mod moments;
 mod normal;
+mod number;
 mod order;
 mod pass;
 mod run;
@@ -63,10 +65,10 @@ mod update;
 #[cfg(test)]
 mod tests;
 
-pub use bound::Kalman;
 pub use coordinates::Coordinates;
 pub use error::FilterError;
 pub(crate) use error::recoverable;
+pub use filter::Kalman;
 pub use filtered::{Filtered, States};
 pub use score::Score;
 pub use settings::{FilterSettings, Method};

@@ -15,60 +15,82 @@
 //! *Automatica* 36 (2000), with h² = 3.
 
 use super::gaussian::Columns;
-use super::size::{Numbers, Size};
-use super::{Method, linearised};
-use crate::math::{Kernel, widest};
-use crate::twin::{Interval, Layout, Now, Points, StateSpace, Workspace};
+use super::number::{Buffers, Call, FilterNumber, MovingPoints};
+use super::size::{Buffer, Size};
+use super::{Kalman, Method, linearised};
+use crate::math::{Condition, Kernel, Number, widest};
+use crate::twin::{Interval, Now, StateSpace};
 use std::f64::consts::SQRT_2;
 
 /// √3: points of the three-point Gauss–Hermite rule, in standard deviations.
 pub(super) const REACH: f64 = 1.732_050_807_568_877_2;
 /// Slope of the difference of two points.
-pub(super) const HALF_PER_REACH: f64 = 0.5 / REACH;
+const HALF_PER_REACH: f64 = 0.5 / REACH;
 /// √2/3: weight of a bend in the covariance.
-pub(super) const BEND: f64 = SQRT_2 / 3.0;
+const BEND: f64 = SQRT_2 / 3.0;
 
 /// Up to so many states a sum of products keeps its entries in registers one by one.
 const FEW: usize = 4;
 /// Sizes that are known when this is compiled.
 const KNOWN: usize = 10;
 
+/// A state that is carried, as mean and covariance, n and n × n.
+pub(super) type Moment<'w, N> = (&'w mut [N], &'w mut [N]);
+
 /// Buffers of one filter run: n states, p outputs.
-pub(super) struct Moments<'a, S: Size> {
+pub(super) struct Moments<'a, S: Size, N: FilterNumber> {
     size: S,
     twin: &'a dyn StateSpace,
     method: Method,
     limits: &'a [Interval],
     /// Limits of points that give a derivative.
     unlimited: Vec<Interval>,
-    work: Workspace,
+    buffers: Buffers,
     /// Standard deviation of each noise, in the reach of its points.
-    shifts: S::Vector,
+    shifts: S::Vector<N>,
     /// The mean, then two points for each direction (columns of the root, then noises); their images; then in the place of each
     /// pair its slope and its bend.
-    points: S::Points,
-    outputs: S::Points,
-    derivatives: S::Matrix,
+    points: Vec<N>,
+    outputs: Vec<N>,
+    derivatives: Vec<N>,
     /// The mean, for calls that would take it out of its registers.
-    at: S::Vector,
+    at: S::Vector<N>,
 }
 
-impl<'a, S: Size> Moments<'a, S> {
-    /// Creates the buffers; `limits` go by state.
-    pub fn new(size: S, twin: &'a dyn StateSpace, method: Method, limits: &'a [Interval]) -> Self {
+impl<'a, S: Size, N: FilterNumber> Moments<'a, S, N> {
+    /// Creates the buffers for the twin, the method and the limits of `kalman`.
+    pub fn new(size: S, kalman: &'a Kalman<'_>) -> Self {
         let (n, p) = (size.states(), size.outputs());
         Self {
             size,
-            twin,
-            method,
-            limits,
+            twin: kalman.twin,
+            method: kalman.settings.method,
+            limits: &kalman.limits,
             unlimited: vec![Interval::EVERYTHING; n],
-            work: Workspace::new(twin),
+            buffers: Buffers::new(kalman.twin, n),
             shifts: S::Vector::zeros(n),
-            points: S::Points::zeros((1 + 4 * n) * n),
-            outputs: S::Points::zeros((1 + 2 * n) * p),
-            derivatives: S::Matrix::zeros(n * n.max(p)),
+            points: vec![N::ZERO; (1 + 4 * n) * n],
+            outputs: vec![N::ZERO; (1 + 2 * n) * p],
+            derivatives: vec![N::ZERO; n * n.max(p)],
             at: S::Vector::zeros(n),
+        }
+    }
+
+    /// The method; lanes have points alone.
+    #[inline(always)]
+    fn method(&self) -> Method {
+        match N::LANES {
+            1 => self.method,
+            _ => Method::Points,
+        }
+    }
+
+    /// Pairs of points that the method needs along a root.
+    #[inline(always)]
+    fn pairs(&self, root: Columns<'_, N>) -> usize {
+        match self.method() {
+            Method::Points => root.rank,
+            Method::Extended => self.size.states(),
         }
     }
 
@@ -79,102 +101,101 @@ impl<'a, S: Size> Moments<'a, S> {
     #[inline(always)]
     pub fn predict(
         &mut self,
-        now: &Now<'_>,
-        q: &[f64],
-        root: Columns<'_>,
-        (mean, cov): (&mut [f64], &mut [f64]),
+        now: &[Now<'_>],
+        q: &[N],
+        root: Columns<'_, N>,
+        (mean, cov): Moment<'_, N>,
     ) {
-        let n = self.size.states();
-        let (mean, q, shifts) = (&mut mean[..n], &q[..n], &mut self.shifts.as_mut()[..n]);
-        let pairs = match self.method {
-            Method::Points => root.rank,
-            Method::Extended => n,
-        };
-        let moving = 1 + 2 * pairs;
-        let all = &mut self.points.as_mut()[..(moving + 2 * n) * n];
-        match self.method {
+        let (n, method) = (self.size.states(), self.method());
+        let moving = 1 + 2 * self.pairs(root);
+        let (mean, q, shifts) = (&mut mean[..n], &q[..n], &mut self.shifts.numbers_mut()[..n]);
+        let all = &mut self.points[..(moving + 2 * n) * n];
+        match method {
             Method::Points => {
                 spread(mean, root, &mut all[..moving * n]);
                 for (shift, q) in shifts.iter_mut().zip(q) {
-                    *shift = REACH * q;
+                    *shift = *q * REACH;
                 }
             }
             Method::Extended => {
-                let at = &mut self.at.as_mut()[..n];
+                let at = &mut self.at.numbers_mut()[..n];
                 for ((at, mean), limit) in at.iter_mut().zip(&*mean).zip(self.limits) {
-                    *at = limit.clamp(*mean);
+                    *at = N::all(limit.high()).min(N::all(limit.low()).max(*mean));
                 }
                 linearised::points(at, root, &mut all[..moving * n]);
                 for ((shift, q), x) in shifts.iter_mut().zip(q).zip(&*mean) {
-                    *shift = if *q == 0.0 {
-                        0.0
-                    } else {
-                        linearised::step(*x, q.abs())
-                    };
+                    let some = varies(*q);
+                    *shift = some.select(linearised::step(*x, q.abs()), N::ZERO);
                 }
             }
         }
-        let points = Points {
+        let points = MovingPoints {
             all,
             moving,
-            limits: match self.method {
+            limits: match method {
                 Method::Points => self.limits,
                 Method::Extended => &self.unlimited,
             },
             shifts,
         };
-        let bent = self.twin.advance_each(now, points, &mut self.work);
-        let all = &mut self.points.as_mut()[..(moving + 2 * n) * n];
+        let call = Call {
+            twin: self.twin,
+            now,
+            buffers: &mut self.buffers,
+        };
+        let bent = N::advance(call, points);
+        let all = &mut self.points[..(moving + 2 * n) * n];
         let (moving, shifted) = all.split_at_mut(moving * n);
-        if self.method == Method::Extended {
-            linearised::slopes(
-                &self.at.as_ref()[..n],
-                root,
-                n,
-                moving,
-                self.derivatives.as_mut(),
-            );
+        if method == Method::Extended {
+            let (at, derivatives) = (&self.at.numbers()[..n], &mut self.derivatives);
+            linearised::slopes(at, root, n, moving, derivatives);
         }
         let (centre, pairs) = moving.split_at_mut(n);
         mean.copy_from_slice(centre);
         let pairs = &mut pairs[..2 * root.rank * n];
-        if self.method == Method::Points {
+        if method == Method::Points {
             differences(pairs, centre, mean);
         }
         outer(pairs, n, cov);
-        if bent {
-            let pairs = (shifted.chunks_exact_mut(2 * n).zip(q.iter().zip(&*shifts)))
-                .filter(|(_, (q, _))| **q != 0.0);
-            for (pair, (q, shift)) in pairs {
-                match self.method {
-                    Method::Points => differences(pair, centre, mean),
-                    Method::Extended => {
-                        let (plus, minus) = pair.split_at_mut(n);
-                        for (plus, minus) in plus.iter_mut().zip(minus) {
-                            (*plus, *minus) = ((*plus - *minus) * (0.5 * q / shift), 0.0);
-                        }
-                    }
-                }
-                add_outer(pair, n, cov);
+        let any_bent = bent.any();
+        for (i, pair) in shifted.chunks_exact_mut(2 * n).enumerate() {
+            // A state without noise has no shifted points.
+            let moved = bent & varies(q[i]);
+            if !(any_bent && moved.any()) {
+                // Straight: the slope is q along the state, the bend zero.
+                cov[i * n + i] += q[i] * q[i];
+                continue;
             }
-        } else {
-            // Straight: the slope is q along the state, the bend zero.
-            for (i, q) in q.iter().enumerate() {
-                cov[i * n + i] += q * q;
+            let (plus, minus) = pair.split_at_mut(n);
+            for j in 0..n {
+                let straight = if i == j { q[i] } else { N::ZERO };
+                let difference = plus[j] - minus[j];
+                let (slope, bend) = match method {
+                    Method::Points => (
+                        difference * HALF_PER_REACH,
+                        (plus[j] + minus[j]) * 0.5 - centre[j],
+                    ),
+                    Method::Extended => (difference * (q[i] * 0.5 / shifts[i]), N::ZERO),
+                };
+                let bend = moved.select(bend, N::ZERO);
+                mean[j] += bend * (1.0 / 3.0);
+                (plus[j], minus[j]) = (moved.select(slope, straight), bend * BEND);
             }
+            add_outer(pair, n, cov);
         }
     }
 
     /// cov(x_k, x_{k+1}) of the last [`predict`](Self::predict) from the same root (n × n, row-major).
-    pub fn cross(&self, root: Columns<'_>, cross: &mut [f64]) {
+    #[inline(always)]
+    pub fn cross(&self, root: Columns<'_, N>, cross: &mut [N]) {
         let n = self.size.states();
-        cross.fill(0.0);
-        let pairs = self.points.as_ref()[n..].chunks_exact(2 * n);
+        cross.fill(N::ZERO);
+        let pairs = self.points[n..].chunks_exact(2 * n);
         for (column, pair) in root.each(n).zip(pairs) {
             let slopes = &pair[..n];
             for (i, l) in column.iter().enumerate() {
                 for (to, slope) in cross[i * n..(i + 1) * n].iter_mut().zip(slopes) {
-                    *to += l * slope;
+                    *to += *l * *slope;
                 }
             }
         }
@@ -184,57 +205,60 @@ impl<'a, S: Size> Moments<'a, S> {
     #[inline(always)]
     pub fn observe(
         &mut self,
-        now: &Now<'_>,
-        mean: &[f64],
-        root: Columns<'_>,
-        y: &mut [f64],
-    ) -> &mut [f64] {
-        let (n, p) = (self.size.states(), self.size.outputs());
+        now: &[Now<'_>],
+        mean: &[N],
+        root: Columns<'_, N>,
+        y: &mut [N],
+    ) -> &mut [N] {
+        let (n, p, method) = (self.size.states(), self.size.outputs(), self.method());
         let (mean, y) = (&mean[..n], &mut y[..p]);
-        let pairs = match self.method {
-            Method::Points => root.rank,
-            Method::Extended => n,
-        };
-        let points = &mut self.points.as_mut()[..(1 + 2 * pairs) * n];
-        let outputs = &mut self.outputs.as_mut()[..(1 + 2 * pairs) * p];
-        match self.method {
+        let pairs = self.pairs(root);
+        let points = &mut self.points[..(1 + 2 * pairs) * n];
+        let outputs = &mut self.outputs[..(1 + 2 * pairs) * p];
+        match method {
             Method::Points => spread(mean, root, points),
             Method::Extended => {
-                let at = &mut self.at.as_mut()[..n];
+                let at = &mut self.at.numbers_mut()[..n];
                 at.copy_from_slice(mean);
                 linearised::points(at, root, points);
             }
         }
-        (self.twin).observe_each(now, Layout::dense(n), p, points, outputs);
-        if self.method == Method::Extended {
-            linearised::slopes(
-                &self.at.as_ref()[..n],
-                root,
-                p,
-                outputs,
-                self.derivatives.as_mut(),
-            );
+        let call = Call {
+            twin: self.twin,
+            now,
+            buffers: &mut self.buffers,
+        };
+        N::observe(call, n, p, points, outputs);
+        if method == Method::Extended {
+            let (at, derivatives) = (&self.at.numbers()[..n], &mut self.derivatives);
+            linearised::slopes(at, root, p, outputs, derivatives);
         }
         let (centre, pairs) = outputs.split_at_mut(p);
         y.copy_from_slice(centre);
         let pairs = &mut pairs[..2 * root.rank * p];
-        if self.method == Method::Points {
+        if method == Method::Points {
             differences(pairs, centre, y);
         }
         pairs
     }
 }
 
+/// Lanes with a noise.
+#[inline(always)]
+fn varies<N: Number>(q: N) -> N::Condition {
+    q.below(N::ZERO) | N::ZERO.below(q)
+}
+
 /// The mean, then two points on each column of the root.
 #[inline(always)]
-fn spread(mean: &[f64], root: Columns<'_>, points: &mut [f64]) {
+fn spread<N: Number>(mean: &[N], root: Columns<'_, N>, points: &mut [N]) {
     let n = mean.len();
     let (centre, pairs) = points.split_at_mut(n);
     centre.copy_from_slice(mean);
     for (column, pair) in root.each(n).zip(pairs.chunks_exact_mut(2 * n)) {
         let (plus, minus) = pair.split_at_mut(n);
         for i in 0..n {
-            let away = REACH * column[i];
+            let away = column[i] * REACH;
             (plus[i], minus[i]) = (mean[i] + away, mean[i] - away);
         }
     }
@@ -242,13 +266,13 @@ fn spread(mean: &[f64], root: Columns<'_>, points: &mut [f64]) {
 
 /// Makes slopes and bends of the images of two points, and adds to `mean` what the bends do to it.
 #[inline(always)]
-fn differences(images: &mut [f64], centre: &[f64], mean: &mut [f64]) {
+fn differences<N: Number>(images: &mut [N], centre: &[N], mean: &mut [N]) {
     let m = centre.len();
     for pair in images.chunks_exact_mut(2 * m) {
         let (plus, minus) = pair.split_at_mut(m);
         for i in 0..m {
             let slope = (plus[i] - minus[i]) * HALF_PER_REACH;
-            let bend = 0.5 * (plus[i] + minus[i]) - centre[i];
+            let bend = (plus[i] + minus[i]) * 0.5 - centre[i];
             mean[i] += bend * (1.0 / 3.0);
             (plus[i], minus[i]) = (slope, bend * BEND);
         }
@@ -257,14 +281,14 @@ fn differences(images: &mut [f64], centre: &[f64], mean: &mut [f64]) {
 
 /// Σ D Dᵀ, both triangles.
 #[inline(always)]
-pub(super) fn outer(deviations: &[f64], n: usize, sum: &mut [f64]) {
-    sum[..n * n].fill(0.0);
+pub(super) fn outer<N: Number>(deviations: &[N], n: usize, sum: &mut [N]) {
+    sum[..n * n].fill(N::ZERO);
     add_outer(deviations, n, sum);
 }
 
 /// Adds Σ D Dᵀ, both triangles, to a symmetric matrix.
 #[inline(always)]
-pub(super) fn add_outer(deviations: &[f64], n: usize, sum: &mut [f64]) {
+pub(super) fn add_outer<N: Number>(deviations: &[N], n: usize, sum: &mut [N]) {
     let sum = &mut sum[..n * n];
     if n <= FEW {
         for i in 0..n {
@@ -281,30 +305,30 @@ pub(super) fn add_outer(deviations: &[f64], n: usize, sum: &mut [f64]) {
     if n <= KNOWN {
         add_rows(deviations, n, sum);
     } else {
-        widest(Rows { deviations, n, sum });
+        widest(SumOfRows { deviations, n, sum });
     }
 }
 
 /// As [`add_outer`], a row of the sum side by side; each entry adds up in the same order.
 #[inline(always)]
-fn add_rows(deviations: &[f64], n: usize, sum: &mut [f64]) {
+fn add_rows<N: Number>(deviations: &[N], n: usize, sum: &mut [N]) {
     for (i, row) in sum.chunks_exact_mut(n).enumerate() {
         for d in deviations.chunks_exact(n) {
             let share = d[i];
             for (entry, d) in row.iter_mut().zip(d) {
-                *entry += share * d;
+                *entry += share * *d;
             }
         }
     }
 }
 
-struct Rows<'w> {
-    deviations: &'w [f64],
+struct SumOfRows<'w, N> {
+    deviations: &'w [N],
     n: usize,
-    sum: &'w mut [f64],
+    sum: &'w mut [N],
 }
 
-impl Kernel for Rows<'_> {
+impl<N: Number> Kernel for SumOfRows<'_, N> {
     type Output = ();
 
     #[inline(always)]

@@ -1,38 +1,44 @@
-//! One pass of the filter over its record, row by row.
+//! One pass of a filter over its record, row by row; or of several filters side by side.
 
 use super::gaussian::{Belief, Columns, Root, regular};
-use super::likelihood::{LOG_TWO_PI, LogLikelihood};
-use super::moments::Moments;
+use super::likelihood::LOG_TWO_PI;
+use super::moments::{Moment, Moments};
+use super::normal::clip::clip;
+use super::number::FilterNumber;
 use super::order::Order;
-use super::size::{Numbers, Size};
-use super::update::{Measured, Update};
+use super::size::{Buffer, Size};
+use super::update::{MeasuredRow, Readings, Update};
 use super::{FilterError, Kalman};
-use crate::twin::{Acting, Now, Outliers};
+use crate::math::{Condition, Number};
+use crate::twin::{Acting, Now};
 
 /// Innovation of one row.
-pub(super) struct Innovation<'w> {
+pub(super) struct Innovation<'w, N = f64> {
     /// Outputs given the rows before.
-    pub predicted: &'w [f64],
-    pub innovation: &'w [f64],
+    pub predicted: &'w [N],
+    pub innovation: &'w [N],
     /// p × p.
-    pub covariance: &'w [f64],
-    pub standardised: &'w [f64],
+    pub covariance: &'w [N],
+    /// Not of lanes.
+    pub standardised: &'w [N],
     /// The row of the record; NaN where an output is missing, and so has no density.
-    measured: &'w [f64],
+    measured: &'w [N],
     /// Variance of each output given those before it.
-    pivots: &'w [f64],
+    pivots: &'w [N],
     /// Nats by which the density exceeds a normal one.
-    excess: f64,
+    excess: N,
     order: &'w Order<'w>,
     row: usize,
 }
 
-impl Innovation<'_> {
+impl<N> Innovation<'_, N> {
     /// Sample at which the record has output j, if it has it.
     pub fn sample_of(&self, j: usize) -> Option<usize> {
         self.order.sample_of(self.row, j)
     }
+}
 
+impl Innovation<'_> {
     /// log p(y_k | y_0 … y_{k−1}), in nats.
     pub fn log_density(&self) -> f64 {
         let values = (self.standardised.iter().zip(self.pivots)).zip(self.measured);
@@ -45,29 +51,32 @@ impl Innovation<'_> {
 }
 
 /// Receiver of the results of a pass. Results that it does not need are not computed.
-pub(super) trait Sink {
+pub(super) trait Sink<N = f64> {
     /// Returns `true` if [`carried`](Self::carried) is wanted.
     #[inline(always)]
     fn wants_carried(&self) -> bool {
         false
     }
     /// Takes that of row i in the [`Order`] of the filter.
-    fn innovation(&mut self, _i: usize, _of: &Innovation<'_>) {}
+    #[inline(always)]
+    fn innovation(&mut self, _i: usize, _of: &Innovation<'_, N>) {}
     /// State given rows up to k.
-    fn filtered(&mut self, _k: usize, _state: Belief<'_>) {}
+    #[inline(always)]
+    fn filtered(&mut self, _k: usize, _state: Belief<'_, N>) {}
     /// State of row k + 1 given rows up to k, and cov(x_k, x_{k+1}).
-    fn carried(&mut self, _k: usize, _next: Belief<'_>, _cross: &[f64]) {}
+    #[inline(always)]
+    fn carried(&mut self, _k: usize, _next: Belief<'_, N>, _cross: &[N]) {}
 }
 
-impl Sink for () {}
+impl<N> Sink<N> for () {}
 
 /// The state given the rows so far; apart from the buffers, of which calls to the twin see some, so that it can stay in registers.
-struct State<S: Size> {
-    mean: S::Vector,
-    cov: S::Matrix,
+struct FilterState<S: Size, N: Number> {
+    mean: S::Vector<N>,
+    cov: S::Matrix<N>,
 }
 
-impl<S: Size> State<S> {
+impl<S: Size, N: Number> FilterState<S, N> {
     #[inline(always)]
     fn zero(n: usize) -> Self {
         Self {
@@ -77,195 +86,233 @@ impl<S: Size> State<S> {
     }
 
     #[inline(always)]
-    fn slices(&mut self, n: usize) -> (&mut [f64], &mut [f64]) {
+    fn slices(&mut self, n: usize) -> Moment<'_, N> {
         (
-            &mut self.mean.as_mut()[..n],
-            &mut self.cov.as_mut()[..n * n],
+            &mut self.mean.numbers_mut()[..n],
+            &mut self.cov.numbers_mut()[..n * n],
         )
     }
 
     #[inline(always)]
-    fn set(&mut self, to: Belief<'_>) {
+    fn set(&mut self, to: Belief<'_, N>) {
         let (mean, cov) = self.slices(to.mean.len());
         mean.copy_from_slice(to.mean);
         cov.copy_from_slice(to.cov);
     }
 
     #[inline(always)]
-    fn belief(&self, n: usize) -> Belief<'_> {
+    fn belief(&self, n: usize) -> Belief<'_, N> {
         Belief {
-            mean: &self.mean.as_ref()[..n],
-            cov: &self.cov.as_ref()[..n * n],
+            mean: &self.mean.numbers()[..n],
+            cov: &self.cov.numbers()[..n * n],
         }
     }
 }
 
-/// Twin, record and θ that a pass runs over.
-pub(super) struct Bound<'k> {
-    pub kalman: &'k Kalman<'k>,
-    pub acting: &'k Acting<'k>,
-    pub order: &'k Order<'k>,
-    pub theta: &'k [f64],
+/// A record that a filter runs over, at θ.
+pub(super) struct FilterJob<'j> {
+    pub kalman: &'j Kalman<'j>,
+    pub order: &'j Order<'j>,
+    pub theta: &'j [f64],
+    /// The record's drive as the twin sees it at θ.
+    pub acting: Acting<'j>,
 }
 
-/// The filter at one θ: buffers, and the likelihood of the rows so far.
-pub(super) struct Pass<'k, S: Size> {
+/// A filter of each job, one a lane: buffers, and the likelihood of the rows so far. The records of all jobs are of one twin, and have the
+/// same rows missing.
+pub(super) struct Pass<'k, S: Size, N: FilterNumber> {
     size: S,
+    jobs: &'k [FilterJob<'k>],
+    /// The first job's; so is the order.
     kalman: &'k Kalman<'k>,
-    acting: &'k Acting<'k>,
     order: &'k Order<'k>,
-    now: Now<'k>,
-    root: Root<S::Matrix>,
-    moments: Moments<'k, S>,
-    update: Update<S>,
+    now: Vec<Now<'k>>,
+    moments: Moments<'k, S, N>,
+    update: Update<S, N>,
     /// Standard deviations of process and measurement noise.
-    q: S::Vector,
-    r: S::Vector,
-    predicted: S::Vector,
-    scale: S::Vector,
-    copy: State<S>,
-    floor: S::Vector,
-    rounding: Vec<f64>,
-    outliers: Vec<Outliers>,
-    likelihood: LogLikelihood,
+    q: S::Vector<N>,
+    r: S::Vector<N>,
+    /// The row, and its prediction.
+    y: S::Vector<N>,
+    predicted: S::Vector<N>,
+    scale: S::Vector<N>,
+    copy: FilterState<S, N>,
+    floor: S::Vector<N>,
+    readings: Vec<Readings>,
+    /// Lanes in which the filter works.
+    valid: N::Condition,
 }
 
-impl<'k, S: Size> Pass<'k, S> {
-    pub fn new(size: S, on: &'k Bound<'k>) -> Self {
-        let Bound {
-            kalman,
-            acting,
-            order,
-            theta,
-        } = on;
+impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
+    pub fn new(size: S, jobs: &'k [FilterJob<'k>]) -> Self {
         let (n, p) = (size.states(), size.outputs());
-        let (twin, method) = (kalman.twin, kalman.settings.method);
-        let rounding = twin.rounding(theta);
+        let FilterJob { kalman, order, .. } = jobs[0];
+        let readings: Vec<Option<Readings>> = (jobs.iter())
+            .map(|job| Readings::of(kalman.twin, job.theta))
+            .collect();
         let mut floor = S::Vector::zeros(p);
-        for j in 0..p {
-            let rounds = rounding.get(j).is_some_and(|step| *step > 0.0);
-            floor.as_mut()[j] = match rounds {
-                true => kalman.floor[j],
-                false => kalman.unrounded[j],
-            };
+        for (j, floor) in floor.numbers_mut()[..p].iter_mut().enumerate() {
+            *floor = N::of_lanes(|lane| {
+                let i = held_by(lane, jobs.len());
+                let rounds = readings[i].as_ref().is_some_and(|r| r.rounds(j));
+                match rounds {
+                    true => jobs[i].kalman.floor[j],
+                    false => jobs[i].kalman.unrounded[j],
+                }
+            });
         }
         Self {
             size,
+            jobs,
             kalman,
-            acting,
             order,
-            now: acting.at(0, theta),
-            root: Root::new(n),
-            copy: State::zero(n),
-            moments: Moments::new(size, twin, method, &kalman.limits),
+            now: (jobs.iter())
+                .map(|job| job.acting.at(0, job.theta))
+                .collect(),
+            copy: FilterState::zero(n),
+            moments: Moments::new(size, kalman),
             update: Update::new(size),
             q: S::Vector::zeros(n),
             r: S::Vector::zeros(p),
+            y: S::Vector::zeros(p),
             predicted: S::Vector::zeros(p),
             scale: S::Vector::zeros(n),
             floor,
-            rounding,
-            outliers: twin.outliers(theta),
-            likelihood: LogLikelihood::NONE,
+            readings: match readings.iter().any(Option::is_some) {
+                true => readings
+                    .into_iter()
+                    .map(Option::unwrap_or_default)
+                    .collect(),
+                false => vec![],
+            },
+            valid: N::ZERO.below(N::all(1.0)),
         }
     }
 
-    /// Over the whole record; the log-likelihood.
-    pub fn run<K: Sink + ?Sized>(mut self, sink: &mut K) -> Result<f64, FilterError> {
+    /// Over the whole record; the log-likelihood, NaN in lanes that failed.
+    #[inline(always)]
+    pub fn run<K: Sink<N> + ?Sized>(mut self, sink: &mut K) -> Result<N, FilterError> {
+        let mut root = Root::new(self.size.states());
         let mut state = self.start();
-        let last = self.order.rows() - 1;
-        for i in 0..last {
-            self.measure(i, &mut state, sink)?;
-            if i >= self.order.before {
-                self.carry(i - self.order.before, &mut state, sink);
+        for i in 0..self.order.rows() {
+            self.measure(i, &mut state, &mut root, sink)?;
+            if i >= self.order.before && i + 1 < self.order.rows() {
+                self.carry(i - self.order.before, &mut state, &mut root, sink);
             }
         }
-        self.measure(last, &mut state, sink)?;
-        Ok(self.likelihood.total())
+        let total = self.update.likelihood.total();
+        Ok(self.valid.select(total, N::all(f64::NAN)))
     }
 
     /// From the state given rows up to `from`, or from the start, through rows before `to`.
-    pub fn run_from<K: Sink + ?Sized>(
+    pub fn run_from<K: Sink<N> + ?Sized>(
         mut self,
-        from: Option<(usize, Belief<'_>)>,
+        from: Option<(usize, Belief<'_, N>)>,
         to: usize,
         sink: &mut K,
     ) -> Result<(), FilterError> {
+        let n = self.size.states();
+        let mut root = Root::new(n);
         let (first, mut state) = match from {
             Some((k, belief)) => {
-                let mut state = State::zero(self.size.states());
+                let mut state = FilterState::zero(n);
                 state.set(belief);
-                self.now = self.acting.at(k, self.now.theta);
-                self.noise();
-                self.carry(k, &mut state, sink);
+                self.go_to(k);
+                self.carry(k, &mut state, &mut root, sink);
                 (k + 1, state)
             }
             None => (0, self.start()),
         };
         for k in first..to {
-            self.measure(k, &mut state, sink)?;
-            self.carry(k, &mut state, sink);
+            self.measure(k, &mut state, &mut root, sink)?;
+            self.carry(k, &mut state, &mut root, sink);
         }
         Ok(())
     }
 
     /// The first state.
-    fn start(&mut self) -> State<S> {
-        let n = self.size.states();
+    #[inline(always)]
+    fn start(&mut self) -> FilterState<S, N> {
         // In the copy: what a call has seen leaves the registers.
-        let (mean, cov) = self.copy.slices(n);
-        (self.kalman).start(&self.now, mean, cov, self.scale.as_mut());
-        let mut state = State::zero(n);
+        self.start_copy();
+        let n = self.size.states();
+        let mut state = FilterState::zero(n);
         state.set(self.copy.belief(n));
         state
     }
 
-    /// Noise levels of this row.
+    fn start_copy(&mut self) {
+        let n = self.size.states();
+        let (mut mean, mut cov, mut scale) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n]);
+        let (means, covs) = self.copy.slices(n);
+        for lane in 0..N::LANES {
+            let i = held_by(lane, self.jobs.len());
+            cov.fill(0.0);
+            (self.jobs[i].kalman).start(&self.now[i], &mut mean, &mut cov, &mut scale);
+            let to = means.iter_mut().chain(&mut *covs);
+            for (to, value) in to.zip(mean.iter().chain(&cov)) {
+                *to.lane_mut(lane) = *value;
+            }
+        }
+    }
+
+    /// Inputs and noise levels of sample k.
     #[inline(always)]
-    fn noise(&mut self) {
+    fn go_to(&mut self, k: usize) {
+        for (now, job) in self.now.iter_mut().zip(self.jobs) {
+            job.acting.go_to(k, now);
+        }
         let (n, p) = (self.size.states(), self.size.outputs());
-        let (q, r) = (&mut self.q.as_mut()[..n], &mut self.r.as_mut()[..p]);
-        q.fill(0.0);
-        r.fill(0.0);
-        self.kalman.twin.noise(&self.now, q, r);
+        let (q, r) = (
+            &mut self.q.numbers_mut()[..n],
+            &mut self.r.numbers_mut()[..p],
+        );
+        N::noise((self.kalman.twin, &self.now), q, r);
     }
 
     /// Puts row i into the state.
     #[inline(always)]
-    fn measure<K: Sink + ?Sized>(
+    fn measure<K: Sink<N> + ?Sized>(
         &mut self,
         i: usize,
-        state: &mut State<S>,
+        state: &mut FilterState<S, N>,
+        root: &mut Root<S::Matrix<N>>,
         sink: &mut K,
     ) -> Result<(), FilterError> {
         let (n, p) = (self.size.states(), self.size.outputs());
         let k = self.order.state_of(i);
-        self.now = self.acting.at(k, self.now.theta);
-        self.noise();
-        let told = match self.regular(state) {
-            Some(columns) => self.tell(i, state, Columns::all(n, columns.as_ref())),
+        self.go_to(k);
+        for (j, y) in self.y.numbers_mut()[..p].iter_mut().enumerate() {
+            *y = N::of_lanes(|lane| {
+                let job = &self.jobs[held_by(lane, self.jobs.len())];
+                job.order.row(i)[j]
+            });
+        }
+        let good = match self.regular(state) {
+            Some(columns) => self.update_state(state, Columns::all(n, columns.numbers())),
             None => {
-                let root = self.singular(state);
-                let told = self.tell(i, state, root.columns());
-                self.root = root;
-                told
+                self.factor(state, root);
+                self.update_state(state, root.columns())
             }
         };
-        if told.is_none() {
-            return Err(self.lost(state));
-        }
-        if !self.likelihood.is_finite() {
-            return Err(FilterError::Diverged { at: self.now.t });
+        let is_finite = self.update.likelihood.is_finite();
+        let before = self.valid & good;
+        self.valid = before & is_finite;
+        if !self.valid.any() {
+            return Err(match before.any() {
+                true => FilterError::Diverged { at: self.now[0].t },
+                false => self.failure(state),
+            });
         }
         sink.innovation(
             i,
             &Innovation {
-                predicted: &self.predicted.as_ref()[..p],
-                innovation: &self.update.innovation.as_ref()[..p],
-                covariance: &self.update.covariance.as_ref()[..p * p],
-                standardised: &self.update.standardised.as_ref()[..p],
-                measured: self.order.row(i),
-                pivots: &self.update.pivots.as_ref()[..p],
+                predicted: &self.predicted.numbers()[..p],
+                innovation: &self.update.innovation.numbers()[..p],
+                covariance: &self.update.covariance.numbers()[..p * p],
+                standardised: &self.update.standardised.numbers()[..p],
+                measured: &self.y.numbers()[..p],
+                pivots: &self.update.pivots.numbers()[..p],
                 excess: self.update.excess,
                 order: self.order,
                 row: i,
@@ -278,63 +325,70 @@ impl<'k, S: Size> Pass<'k, S> {
     }
 
     #[inline(always)]
-    fn tell(&mut self, i: usize, state: &mut State<S>, root: Columns<'_>) -> Option<()> {
+    fn update_state(
+        &mut self,
+        state: &mut FilterState<S, N>,
+        root: Columns<'_, N>,
+    ) -> N::Condition {
         let (n, p) = (self.size.states(), self.size.outputs());
         let (mean, cov) = state.slices(n);
-        let predicted = &mut self.predicted.as_mut()[..p];
+        let predicted = &mut self.predicted.numbers_mut()[..p];
         let outputs = (self.moments).observe(&self.now, mean, root, predicted);
-        let row = Measured {
-            y: self.order.row(i),
+        let row = MeasuredRow {
+            at: (self.kalman.twin, &self.now),
+            y: &self.y.numbers()[..p],
             predicted,
-            noise: &self.r.as_ref()[..p],
-            floor: &self.floor.as_ref()[..p],
-            rounding: &self.rounding,
-            outliers: &self.outliers,
+            noise: &self.r.numbers()[..p],
+            floor: &self.floor.numbers()[..p],
+            readings: &self.readings,
         };
-        let (at, state) = ((self.kalman.twin, &self.now), (mean, cov));
-        if self.order.gaps && row.y.iter().any(|y| y.is_nan()) {
-            let likelihood = &mut self.likelihood;
-            return (self.update).apply_present(at, &row, root, outputs, state, likelihood);
+        if self.order.gaps && row.y.iter().any(|y| y.lane(0).is_nan()) {
+            return (self.update).apply_present(&row, root, outputs, (mean, cov));
         }
-        (self.update).apply(at, &row, root, outputs, state, &mut self.likelihood)
+        (self.update).apply(&row, root, outputs, (mean, cov))
     }
 
     /// Carries the state from row k to the next.
     #[inline(always)]
-    fn carry<K: Sink + ?Sized>(&mut self, k: usize, state: &mut State<S>, sink: &mut K) {
+    fn carry<K: Sink<N> + ?Sized>(
+        &mut self,
+        k: usize,
+        state: &mut FilterState<S, N>,
+        root: &mut Root<S::Matrix<N>>,
+        sink: &mut K,
+    ) {
         match self.regular(state) {
             Some(columns) => {
-                let all = Columns::all(self.size.states(), columns.as_ref());
+                let all = Columns::all(self.size.states(), columns.numbers());
                 self.predict(k, state, all, sink);
             }
             None => {
-                let root = self.singular(state);
+                self.factor(state, root);
                 self.predict(k, state, root.columns(), sink);
-                self.root = root;
             }
         }
     }
 
     #[inline(always)]
-    fn predict<K: Sink + ?Sized>(
+    fn predict<K: Sink<N> + ?Sized>(
         &mut self,
         k: usize,
-        state: &mut State<S>,
-        root: Columns<'_>,
+        state: &mut FilterState<S, N>,
+        root: Columns<'_, N>,
         sink: &mut K,
     ) {
         let n = self.size.states();
         let (mean, cov) = state.slices(n);
-        (self.moments).predict(&self.now, self.q.as_ref(), root, (mean, cov));
-        let scale = &mut self.scale.as_mut()[..n];
-        let felt = self.kalman.hold(mean, cov, scale);
+        (self.moments).predict(&self.now, self.q.numbers(), root, (mean, cov));
+        let scale = &mut self.scale.numbers_mut()[..n];
+        let felt = clip(mean, cov, &self.kalman.limits, scale);
         if sink.wants_carried() {
-            let mut cross = vec![0.0; n * n];
+            let mut cross = vec![N::ZERO; n * n];
             self.moments.cross(root, &mut cross);
             if felt {
                 for row in cross.chunks_exact_mut(n) {
                     for (c, scale) in row.iter_mut().zip(&*scale) {
-                        *c *= scale;
+                        *c = *c * *scale;
                     }
                 }
             }
@@ -343,38 +397,39 @@ impl<'k, S: Size> Pass<'k, S> {
     }
 
     /// Cholesky's columns of the covariance where all its pivots count, as they mostly do. What follows is compiled for
-    /// this rank apart, and finds the columns in registers.
+    /// this rank apart, and finds the columns in registers. Lanes would change bits of each other.
     #[inline(always)]
-    fn regular(&self, state: &State<S>) -> Option<S::Matrix> {
+    fn regular(&self, state: &FilterState<S, N>) -> Option<S::Matrix<N>> {
         let n = self.size.states();
-        if !S::KNOWN {
+        if !S::KNOWN || N::LANES > 1 {
             return None;
         }
         let mut columns = S::Matrix::zeros(n * n);
         let Belief { mean, cov } = state.belief(n);
-        regular(mean, cov, columns.as_mut()).then_some(columns)
+        regular(mean, cov, columns.numbers_mut()).then_some(columns)
     }
 
-    /// The root of any covariance; to be put back.
+    /// The root of any covariance.
     #[inline(always)]
-    fn singular(&mut self, state: &State<S>) -> Root<S::Matrix> {
+    fn factor(&mut self, state: &FilterState<S, N>, root: &mut Root<S::Matrix<N>>) {
         let n = self.size.states();
-        // Of a copy: what a call has seen leaves the registers.
-        self.copy.set(state.belief(n));
-        let Belief { mean, cov } = self.copy.belief(n);
-        let mut root = std::mem::replace(&mut self.root, Root::new(0));
-        root.factor(mean, cov);
-        root
+        let mut at = state.belief(n);
+        if N::LANES == 1 {
+            // Of a copy: what a call has seen leaves the registers.
+            self.copy.set(at);
+            at = self.copy.belief(n);
+        }
+        root.factor(at.mean, at.cov);
     }
 
     #[inline(always)]
-    fn lost(&self, state: &State<S>) -> FilterError {
-        let at = self.now.t;
+    fn failure(&self, state: &FilterState<S, N>) -> FilterError {
+        let at = self.now[0].t;
         let (n, p) = (self.size.states(), self.size.outputs());
-        let covariance = &self.update.covariance.as_ref()[..p * p];
-        let mut finite = covariance.iter().all(|v| v.is_finite());
+        let covariance = &self.update.covariance.numbers()[..p * p];
+        let mut finite = covariance.iter().all(|v| v.lane(0).is_finite());
         for v in state.belief(n).mean {
-            finite &= v.is_finite();
+            finite &= v.lane(0).is_finite();
         }
         if finite {
             FilterError::NoSpread { at }
@@ -382,4 +437,10 @@ impl<'k, S: Size> Pass<'k, S> {
             FilterError::Diverged { at }
         }
     }
+}
+
+/// The job of a lane; lanes without one repeat the first.
+#[inline(always)]
+fn held_by(lane: usize, jobs: usize) -> usize {
+    if lane < jobs { lane } else { 0 }
 }

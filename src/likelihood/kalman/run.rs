@@ -1,8 +1,9 @@
 //! Runs of a filter at one θ.
 
+use super::normal::clip::clip;
 use super::order::Order;
-use super::pass::{Bound, Pass, Sink};
-use super::size::{Any, Fixed};
+use super::pass::{FilterJob, Pass, Sink};
+use super::size::{Any, with_size};
 use super::start::spread_start;
 use super::{FilterError, Kalman};
 use crate::twin::{Acting, Now};
@@ -30,7 +31,7 @@ impl Kalman<'_> {
             None if !spread_start(self.twin, now, mean, cov) => return,
             None => {}
         }
-        self.hold(mean, cov, scale);
+        clip(mean, cov, &self.limits, scale);
     }
 
     /// log p(y | θ), in nats.
@@ -58,25 +59,27 @@ impl Kalman<'_> {
         theta: &[f64],
         sink: &mut K,
     ) -> Result<f64, FilterError> {
-        let acting = self.acting(theta)?;
-        let on = &Bound {
+        let jobs = &[self.job(order, theta)?];
+        let (states, outputs) = (self.states, self.channels);
+        with_size!(
+            (states, outputs),
+            [1 2 3 4 5 6 7 8 9 10],
+            |size| Pass::new(size, jobs).run(sink),
+            Pass::new(Any { states, outputs }, jobs).run(sink)
+        )
+    }
+
+    /// This filter at θ, the rows in this order.
+    pub(super) fn job<'j>(
+        &'j self,
+        order: &'j Order<'j>,
+        theta: &'j [f64],
+    ) -> Result<FilterJob<'j>, FilterError> {
+        Ok(FilterJob {
             kalman: self,
-            acting: &acting,
             order,
             theta,
-        };
-        match (self.states, self.channels) {
-            (1, 1) => Pass::new(Fixed::<1>, on).run(sink),
-            (2, 1) => Pass::new(Fixed::<2>, on).run(sink),
-            (3, 1) => Pass::new(Fixed::<3>, on).run(sink),
-            (4, 1) => Pass::new(Fixed::<4>, on).run(sink),
-            (5, 1) => Pass::new(Fixed::<5>, on).run(sink),
-            (6, 1) => Pass::new(Fixed::<6>, on).run(sink),
-            (7, 1) => Pass::new(Fixed::<7>, on).run(sink),
-            (8, 1) => Pass::new(Fixed::<8>, on).run(sink),
-            (9, 1) => Pass::new(Fixed::<9>, on).run(sink),
-            (10, 1) => Pass::new(Fixed::<10>, on).run(sink),
-            (states, outputs) => Pass::new(Any { states, outputs }, on).run(sink),
-        }
+            acting: self.acting(theta)?,
+        })
     }
 }

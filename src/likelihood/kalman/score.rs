@@ -1,6 +1,6 @@
 //! The gradient of the log-likelihood.
 
-use super::lanes::{Together, together};
+use super::beside::{Together, together};
 use super::order::Order;
 use super::pass::{Innovation, Sink};
 use super::{Coordinates, FilterError, Kalman};
@@ -33,12 +33,12 @@ pub struct Score {
 const FORWARD: f64 = 1e-2;
 
 /// Log-density, innovation and covariance of each row.
-struct Rows {
+struct ScoreRows {
     width: usize,
     values: DVector<f64>,
 }
 
-impl Rows {
+impl ScoreRows {
     fn new(kalman: &Kalman<'_>, order: &Order<'_>) -> Self {
         let p = kalman.channels;
         let width = 1 + p + p * p;
@@ -49,7 +49,7 @@ impl Rows {
     }
 }
 
-impl Sink for Rows {
+impl Sink for ScoreRows {
     fn innovation(&mut self, i: usize, of: &Innovation<'_>) {
         let p = of.innovation.len();
         let row = &mut self.values.as_mut_slice()[i * self.width..(i + 1) * self.width];
@@ -320,7 +320,7 @@ fn rows(
     order: &Order<'_>,
     theta: &[f64],
 ) -> Result<(f64, DVector<f64>), FilterError> {
-    let mut rows = Rows::new(kalman, order);
+    let mut rows = ScoreRows::new(kalman, order);
     let sink: &mut dyn Sink = &mut rows;
     let log_likelihood = kalman.run_in(order, theta, sink)?;
     Ok((log_likelihood, rows.values))

@@ -1,14 +1,14 @@
 //! Sizes of a run, and where its numbers are kept.
 
+use crate::math::Number;
+
 /// States n and outputs p of a run. The pass is compiled for each implementation, so that loops over a [`Fixed`]
 /// size have known ends and numbers lie side by side.
 pub(super) trait Size: Copy {
     /// n or p numbers.
-    type Vector: Numbers;
+    type Vector<N: Number>: Buffer<N>;
     /// n × n numbers.
-    type Matrix: Numbers;
-    /// A centre and four points for each state: (1 + 4·n)·n numbers.
-    type Points: Numbers;
+    type Matrix<N: Number>: Buffer<N>;
 
     /// `true` if sizes are known when this is compiled.
     const KNOWN: bool;
@@ -17,51 +17,79 @@ pub(super) trait Size: Copy {
     fn outputs(self) -> usize;
 }
 
-/// A buffer.
-pub(super) trait Numbers: AsRef<[f64]> + AsMut<[f64]> {
+/// Numbers one after the other.
+pub(super) trait Buffer<N> {
     /// At least `length` zeros.
     fn zeros(length: usize) -> Self;
+    fn numbers(&self) -> &[N];
+    fn numbers_mut(&mut self) -> &mut [N];
 }
 
-impl<const CAPACITY: usize> Numbers for [f64; CAPACITY] {
+impl<N: Number, const LENGTH: usize> Buffer<N> for [N; LENGTH] {
+    #[inline(always)]
     fn zeros(length: usize) -> Self {
-        debug_assert!(length <= CAPACITY);
-        [0.0; CAPACITY]
+        debug_assert!(length <= LENGTH);
+        [N::ZERO; LENGTH]
+    }
+    #[inline(always)]
+    fn numbers(&self) -> &[N] {
+        self
+    }
+    #[inline(always)]
+    fn numbers_mut(&mut self) -> &mut [N] {
+        self
     }
 }
 
-impl Numbers for Vec<f64> {
+impl<N: Number, const ROWS: usize, const COLUMNS: usize> Buffer<N> for [[N; COLUMNS]; ROWS] {
+    #[inline(always)]
     fn zeros(length: usize) -> Self {
-        vec![0.0; length]
+        debug_assert!(length <= ROWS * COLUMNS);
+        [[N::ZERO; COLUMNS]; ROWS]
+    }
+    #[inline(always)]
+    fn numbers(&self) -> &[N] {
+        self.as_flattened()
+    }
+    #[inline(always)]
+    fn numbers_mut(&mut self) -> &mut [N] {
+        self.as_flattened_mut()
     }
 }
 
-/// N states, up to ten, and one output.
+impl<N: Number> Buffer<N> for Vec<N> {
+    fn zeros(length: usize) -> Self {
+        vec![N::ZERO; length]
+    }
+    #[inline(always)]
+    fn numbers(&self) -> &[N] {
+        self
+    }
+    #[inline(always)]
+    fn numbers_mut(&mut self) -> &mut [N] {
+        self
+    }
+}
+
+/// N states and one output.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fixed<const N: usize>;
+pub(super) struct Fixed<const STATES: usize>;
 
-macro_rules! fixed {
-    ($($n:literal),+) => {
-        $(impl Size for Fixed<$n> {
-            type Vector = [f64; $n];
-            type Matrix = [f64; $n * $n];
-            type Points = [f64; (1 + 4 * $n) * $n];
+impl<const STATES: usize> Size for Fixed<STATES> {
+    type Vector<N: Number> = [N; STATES];
+    type Matrix<N: Number> = [[N; STATES]; STATES];
 
-            const KNOWN: bool = true;
+    const KNOWN: bool = true;
 
-            #[inline(always)]
-            fn states(self) -> usize {
-                $n
-            }
-            #[inline(always)]
-            fn outputs(self) -> usize {
-                1
-            }
-        })+
-    };
+    #[inline(always)]
+    fn states(self) -> usize {
+        STATES
+    }
+    #[inline(always)]
+    fn outputs(self) -> usize {
+        1
+    }
 }
-
-fixed!(1, 2, 3, 4, 5, 6, 7, 8, 9, 10);
 
 /// Any number of states and outputs.
 #[derive(Debug, Clone, Copy)]
@@ -71,9 +99,8 @@ pub(super) struct Any {
 }
 
 impl Size for Any {
-    type Vector = Vec<f64>;
-    type Matrix = Vec<f64>;
-    type Points = Vec<f64>;
+    type Vector<N: Number> = Vec<N>;
+    type Matrix<N: Number> = Vec<N>;
 
     const KNOWN: bool = false;
 
@@ -84,3 +111,17 @@ impl Size for Any {
         self.outputs
     }
 }
+
+/// Evaluates an expression with the size of a filter bound to a name: a [`Fixed`] one where it is listed, or else the last expression.
+macro_rules! with_size {
+    (($states:expr, $outputs:expr), [$($known:literal)+], |$size:ident| $known_do:expr, $else_do:expr) => {
+        match ($states, $outputs) {
+            $(($known, 1) => {
+                let $size = $crate::likelihood::kalman::size::Fixed::<$known>;
+                $known_do
+            })+
+            _ => $else_do,
+        }
+    };
+}
+pub(super) use with_size;

@@ -73,7 +73,7 @@ impl Kalman<'_> {
                     }
                 }
             }
-            states.set(k, self.told(state.clone()).as_belief());
+            states.set(k, self.held_in_limits(state.clone()).as_belief());
             later = state;
         }
         Ok(states)

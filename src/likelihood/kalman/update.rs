@@ -2,10 +2,12 @@
 
 use super::gaussian::Columns;
 use super::likelihood::LogLikelihood;
-use super::moments::{add_outer, outer};
+use super::moments::{Moment, add_outer, outer};
 use super::normal::cell::Cell;
-use super::size::{Numbers, Size};
-use crate::twin::{Now, Outliers, StateSpace};
+use super::number::{Asked, FilterNumber};
+use super::size::{Buffer, Size};
+use crate::math::{Condition, Number};
+use crate::twin::{Outliers, StateSpace};
 
 /// Nodes and weights of the Gauss–Hermite rule with five points, for a standard normal.
 const NODES: [(f64, f64); 5] = [
@@ -25,50 +27,74 @@ const NODES: [(f64, f64); 5] = [
 /// ```
 ///
 /// The last form (Joseph's) is non-negative whatever the rounding, also where R is far below P.
-pub(super) struct Update<S: Size> {
+pub(super) struct Update<S: Size, N: Number> {
     size: S,
     /// Variance of the measurement noise and of what the readout hides, by output.
-    noise: S::Vector,
+    noise: S::Vector<N>,
     /// Σ Z Zᵀ + R (p × p).
-    beside: S::Matrix,
+    beside: S::Matrix<N>,
     /// y − ȳ.
-    pub innovation: S::Vector,
+    pub innovation: S::Vector<N>,
     /// S (p × p).
-    pub covariance: S::Matrix,
-    /// C⁻¹·(y − ȳ), with S = C·Cᵀ.
-    pub standardised: S::Vector,
+    pub covariance: S::Matrix<N>,
+    /// C⁻¹·(y − ȳ), with S = C·Cᵀ; not of lanes.
+    pub standardised: S::Vector<N>,
     /// Squares of C's diagonal: variance of each output given those before it.
-    pub pivots: S::Vector,
+    pub pivots: S::Vector<N>,
     /// Nats by which the density of the row exceeds that of N(ȳ, S): outliers make it a mixture, rounding the mean over a cell.
-    pub excess: f64,
+    pub excess: N,
+    /// Likelihood of the rows so far.
+    pub likelihood: LogLikelihood<N>,
     /// C, row-major, lower.
-    factor: S::Matrix,
+    factor: S::Matrix<N>,
     /// K (n × p).
-    gain: S::Matrix,
+    gain: S::Matrix<N>,
     /// X − K·Y.
-    rest: S::Matrix,
-    /// Readout of the nodes of each output (5 × p), and of the row itself.
-    read: S::Points,
-    again: S::Vector,
+    rest: S::Matrix<N>,
+    /// Readout of the nodes of each output (5 × p).
+    read: Vec<N>,
 }
 
-/// One row of a record, and how well it could be measured.
-pub(super) struct Measured<'w> {
+/// One row of the records, and how well it could be measured.
+pub(super) struct MeasuredRow<'w, 'n, N> {
+    /// The twin where the filters are.
+    pub at: Asked<'w, 'n>,
     /// The outputs.
-    pub y: &'w [f64],
+    pub y: &'w [N],
     /// ȳ, predicted without the readout.
-    pub predicted: &'w [f64],
+    pub predicted: &'w [N],
     /// Standard deviations of the measurement noise.
-    pub noise: &'w [f64],
+    pub noise: &'w [N],
     /// Least variances.
-    pub floor: &'w [f64],
-    /// Steps by output; empty for none.
-    pub rounding: &'w [f64],
-    /// By output; empty for none.
-    pub outliers: &'w [Outliers],
+    pub floor: &'w [N],
+    /// Rounding and outliers in each lane; empty where no twin has any.
+    pub readings: &'w [Readings],
 }
 
-impl<S: Size> Update<S> {
+/// Rounding and outliers of a sensor.
+#[derive(Default)]
+pub(super) struct Readings {
+    /// Steps by output; empty for none.
+    rounding: Vec<f64>,
+    /// By output; empty for none.
+    outliers: Vec<Outliers>,
+}
+
+impl Readings {
+    /// Those of a twin at θ; `None` where it has neither.
+    pub fn of(twin: &dyn StateSpace, theta: &[f64]) -> Option<Self> {
+        let (rounding, outliers) = (twin.rounding(theta), twin.outliers(theta));
+        let any = !(rounding.is_empty() && outliers.is_empty());
+        any.then_some(Self { rounding, outliers })
+    }
+
+    /// Tells whether output j is rounded.
+    pub fn rounds(&self, j: usize) -> bool {
+        self.rounding.get(j).is_some_and(|step| *step > 0.0)
+    }
+}
+
+impl<S: Size, N: FilterNumber> Update<S, N> {
     pub fn new(size: S) -> Self {
         let (n, p) = (size.states(), size.outputs());
         Self {
@@ -79,44 +105,25 @@ impl<S: Size> Update<S> {
             covariance: S::Matrix::zeros(p * p),
             standardised: S::Vector::zeros(p),
             pivots: S::Vector::zeros(p),
-            excess: 0.0,
+            excess: N::ZERO,
+            likelihood: LogLikelihood::none(),
             factor: S::Matrix::zeros(p * p),
             gain: S::Matrix::zeros(n * p),
             rest: S::Matrix::zeros(n * n),
-            read: S::Points::zeros(NODES.len() * p),
-            again: S::Vector::zeros(p),
+            read: vec![N::ZERO; NODES.len() * p],
         }
     }
 
-    /// Puts a row into the state and its density into `likelihood`; `None` where S has no inverse or is not finite.
+    /// Puts a row into the state and its density into the likelihood; the lanes in which S has an inverse and is finite.
     #[inline(always)]
     pub fn apply(
         &mut self,
-        (twin, now): (&dyn StateSpace, &Now<'_>),
-        row: &Measured<'_>,
-        root: Columns<'_>,
-        outputs: &mut [f64],
-        (mean, cov): (&mut [f64], &mut [f64]),
-        likelihood: &mut LogLikelihood,
-    ) -> Option<()> {
-        let p = self.size.outputs();
-        let (noise, innovation) = (self.noise.as_mut(), self.innovation.as_mut());
-        for j in 0..p {
-            noise[j] = (row.noise[j] * row.noise[j]).max(row.floor[j]);
-            innovation[j] = row.y[j] - row.predicted[j];
-        }
-        self.spread(outputs);
-        if self.reads(twin, now, row) {
-            self.bend((twin, now), row, outputs);
-            self.spread(outputs);
-        }
-        if !(row.rounding.is_empty() && row.outliers.is_empty()) {
-            self.finished(row.rounding, row.outliers, |_| true);
-            likelihood.shift(self.excess);
-        }
-        self.standardise(likelihood, |_| true)?;
-        self.correct(root, outputs, (mean, cov));
-        Some(())
+        row: &MeasuredRow<'_, '_, N>,
+        root: Columns<'_, N>,
+        outputs: &mut [N],
+        state: Moment<'_, N>,
+    ) -> N::Condition {
+        self.update(row, root, outputs, state, |_| false)
     }
 
     /// As [`apply`](Self::apply), for a row with missing outputs. To the others they are outputs of unit noise that follow no
@@ -124,74 +131,114 @@ impl<S: Size> Update<S> {
     #[cold]
     pub fn apply_present(
         &mut self,
-        (twin, now): (&dyn StateSpace, &Now<'_>),
-        row: &Measured<'_>,
-        root: Columns<'_>,
-        outputs: &mut [f64],
-        (mean, cov): (&mut [f64], &mut [f64]),
-        likelihood: &mut LogLikelihood,
-    ) -> Option<()> {
-        let p = self.size.outputs();
-        let missing = |j: usize| row.y[j].is_nan();
+        row: &MeasuredRow<'_, '_, N>,
+        root: Columns<'_, N>,
+        outputs: &mut [N],
+        state: Moment<'_, N>,
+    ) -> N::Condition {
+        let is_missing: Vec<bool> = row.y.iter().map(|y| y.lane(0).is_nan()).collect();
         // A sensor's readout may look at all outputs.
-        let filled: Vec<f64> = (row.y.iter().zip(row.predicted))
-            .map(|(y, predicted)| if y.is_nan() { *predicted } else { *y })
+        let filled: Vec<N> = (row.y.iter().zip(row.predicted))
+            .zip(&is_missing)
+            .map(|((y, predicted), missing)| if *missing { *predicted } else { *y })
             .collect();
-        let filled = Measured { y: &filled, ..*row };
-        for j in 0..p {
-            self.noise.as_mut()[j] = (row.noise[j] * row.noise[j]).max(row.floor[j]);
-            self.innovation.as_mut()[j] = filled.y[j] - row.predicted[j];
-        }
-        self.spread(outputs);
-        if self.reads(twin, now, &filled) {
-            self.bend((twin, now), &filled, outputs);
-        }
-        for j in (0..p).filter(|&j| missing(j)) {
-            (self.noise.as_mut()[j], self.innovation.as_mut()[j]) = (1.0, 0.0);
-            outputs.iter_mut().skip(j).step_by(p).for_each(|y| *y = 0.0);
-        }
-        self.spread(outputs);
-        self.finished(row.rounding, row.outliers, |j| !missing(j));
-        likelihood.shift(self.excess);
-        self.standardise(likelihood, |j| !missing(j))?;
-        // A row without any output leaves the state to the bit.
-        if !(0..p).all(missing) {
-            self.correct(root, outputs, (mean, cov));
-        }
-        Some(())
+        let filled = MeasuredRow { y: &filled, ..*row };
+        self.update(&filled, root, outputs, state, |j| is_missing[j])
     }
 
-    /// C⁻¹·(y − ȳ), and the density of the outputs that `counts` picks.
     #[inline(always)]
-    fn standardise(
+    fn update(
         &mut self,
-        likelihood: &mut LogLikelihood,
-        counts: impl Fn(usize) -> bool,
-    ) -> Option<()> {
-        self.factor()?;
+        row: &MeasuredRow<'_, '_, N>,
+        root: Columns<'_, N>,
+        outputs: &mut [N],
+        state: Moment<'_, N>,
+        is_missing: impl Fn(usize) -> bool,
+    ) -> N::Condition {
         let p = self.size.outputs();
-        let (factor, pivots) = (self.factor.as_ref(), self.pivots.as_ref());
-        let (innovation, standardised) = (self.innovation.as_ref(), self.standardised.as_mut());
+        let (noise, innovation) = (self.noise.numbers_mut(), self.innovation.numbers_mut());
+        for j in 0..p {
+            noise[j] = (row.noise[j] * row.noise[j]).max(row.floor[j]);
+            innovation[j] = row.y[j] - row.predicted[j];
+        }
+        self.spread(outputs);
+        let bent = self.read_nodes(row);
+        let mut changed = bent.any();
+        if changed {
+            self.linearise_readout(row, bent, outputs);
+        }
+        for j in (0..p).filter(|&j| is_missing(j)) {
+            changed = true;
+            self.noise.numbers_mut()[j] = N::all(1.0);
+            self.innovation.numbers_mut()[j] = N::ZERO;
+            outputs
+                .iter_mut()
+                .skip(j)
+                .step_by(p)
+                .for_each(|y| *y = N::ZERO);
+        }
+        if changed {
+            self.spread(outputs);
+        }
+        if !row.readings.is_empty() {
+            self.apply_readings(row.readings, &is_missing);
+            self.likelihood.shift(self.excess);
+        }
+        let good = self.standardise(&is_missing);
+        // A row without any output leaves the state to the bit.
+        if !(0..p).all(is_missing) {
+            self.correct(root, outputs, state);
+        }
+        good
+    }
+
+    /// C⁻¹·(y − ȳ), and the density of the outputs that are there; the lanes in which C is finite and has an inverse.
+    #[inline(always)]
+    fn standardise(&mut self, is_missing: impl Fn(usize) -> bool) -> N::Condition {
+        let p = self.size.outputs();
+        let (covariance, factor) = (self.covariance.numbers(), self.factor.numbers_mut());
+        let (innovation, pivots) = (self.innovation.numbers(), self.pivots.numbers_mut());
+        let standardised = self.standardised.numbers_mut();
+        let mut good = N::ZERO.below(N::all(1.0));
         for i in 0..p {
-            let mut rest = innovation[i];
-            for (c, e) in factor[i * p..i * p + i].iter().zip(&standardised[..i]) {
-                rest -= c * e;
+            for j in 0..=i {
+                let mut entry = covariance[i * p + j];
+                for k in 0..j {
+                    entry = entry - factor[i * p + k] * factor[j * p + k];
+                }
+                if i == j {
+                    // Not so where it is NaN.
+                    let positive = N::ZERO.below(entry) & entry.below(N::all(f64::INFINITY));
+                    good = good & positive;
+                    pivots[i] = entry;
+                    if N::LANES == 1 || p > 1 {
+                        factor[i * p + i] = entry.sqrt();
+                    }
+                } else {
+                    factor[i * p + j] = entry / factor[j * p + j];
+                }
             }
-            standardised[i] = rest / factor[i * p + i];
-            if counts(i) {
-                likelihood.add(pivots[i], rest * rest / pivots[i]);
+            let mut rest = innovation[i];
+            for k in 0..i {
+                rest = rest - factor[i * p + k] * standardised[k];
+            }
+            if N::LANES == 1 || p > 1 {
+                standardised[i] = rest / factor[i * p + i];
+            }
+            if !is_missing(i) {
+                self.likelihood.add(pivots[i], rest * rest / pivots[i]);
             }
         }
-        Some(())
+        good
     }
 
     /// S.
     #[inline(always)]
-    fn spread(&mut self, outputs: &[f64]) {
+    fn spread(&mut self, outputs: &[N]) {
         let p = self.size.outputs();
-        let (beside, covariance) = (self.beside.as_mut(), self.covariance.as_mut());
-        beside[..p * p].fill(0.0);
-        for (j, noise) in self.noise.as_ref()[..p].iter().enumerate() {
+        let (beside, covariance) = (self.beside.numbers_mut(), self.covariance.numbers_mut());
+        beside[..p * p].fill(N::ZERO);
+        for (j, noise) in self.noise.numbers()[..p].iter().enumerate() {
             beside[j * p + j] = *noise;
         }
         for bend in outputs.chunks_exact(p).skip(1).step_by(2) {
@@ -205,97 +252,94 @@ impl<S: Size> Update<S> {
 
     /// A sensor that bends its signal after the noise (saturation) is replaced by the line that is best
     /// for N(ȳ, S); what the line misses joins the noise. The noise itself is never taken off: a saturated sensor
-    /// says little, but not with certainty. Returns whether anything is bent.
+    /// says little, but not with certainty. Returns the lanes in which anything is bent.
     #[inline(always)]
-    fn reads(&mut self, twin: &dyn StateSpace, now: &Now<'_>, row: &Measured<'_>) -> bool {
+    fn read_nodes(&mut self, row: &MeasuredRow<'_, '_, N>) -> N::Condition {
         let p = self.size.outputs();
-        let covariance = self.covariance.as_ref();
-        let read = &mut self.read.as_mut()[..NODES.len() * p];
-        let (outermost, inner) = read.split_at_mut(2 * p);
-        let place = |read: &mut [f64], (node, _): (f64, f64)| {
+        let covariance = self.covariance.numbers();
+        let (outermost, inner) = self.read.split_at_mut(2 * p);
+        let place = |read: &mut [N], (node, _): (f64, f64)| {
             for (j, read) in read.iter_mut().enumerate() {
-                *read = row.predicted[j] + node * covariance[j * p + j].sqrt();
+                *read = row.predicted[j] + covariance[j * p + j].sqrt() * node;
             }
         };
         for (read, node) in outermost.chunks_exact_mut(p).zip(NODES) {
             place(read, node);
         }
         // Where the outermost are not bent, nothing between them is.
-        if !twin.readout_each(now, p, outermost) {
-            return false;
+        let bent = N::readout(row.at, p, outermost);
+        if bent.any() {
+            for (read, node) in inner.chunks_exact_mut(p).zip(&NODES[2..]) {
+                place(read, *node);
+            }
+            N::readout(row.at, p, inner);
         }
-        for (read, node) in inner.chunks_exact_mut(p).zip(&NODES[2..]) {
-            place(read, *node);
-        }
-        twin.readout_each(now, p, inner);
-        true
+        bent
     }
 
     #[cold]
-    fn bend(
+    fn linearise_readout(
         &mut self,
-        (twin, now): (&dyn StateSpace, &Now<'_>),
-        row: &Measured<'_>,
-        outputs: &mut [f64],
+        row: &MeasuredRow<'_, '_, N>,
+        bent: N::Condition,
+        outputs: &mut [N],
     ) {
         let p = self.size.outputs();
-        let again = &mut self.again.as_mut()[..p];
-        again.copy_from_slice(row.y);
-        twin.readout(now, again);
-        let again = &*again;
-        let (read, covariance) = (self.read.as_ref(), self.covariance.as_ref());
-        let (noise, innovation) = (self.noise.as_mut(), self.innovation.as_mut());
-        for j in 0..p {
-            let nodes = || read[j..].iter().step_by(p).take(NODES.len());
-            let miss = row.y[j] - read[j];
-            let near = |a: f64, b: f64| (a - b) * (a - b) <= noise[j];
-            if nodes().all(|v| *v == read[j])
-                && !near(row.y[j], read[j])
-                && near(again[j], row.y[j])
-            {
-                // A step wider than what was expected, and another one was read: the signal is beside an edge. What the
-                // sensor cannot read is not excused so.
-                innovation[j] = miss;
-                noise[j] += miss * miss;
-                continue;
-            }
-            let values = || nodes().zip(NODES);
-            let mean: f64 = values().map(|(v, (_, weight))| weight * v).sum();
-            let slope: f64 = values().map(|(v, (node, weight))| weight * node * v).sum();
-            let variance: f64 = values()
-                .map(|(v, (_, weight))| weight * (v - mean).powi(2))
-                .sum();
-            innovation[j] = row.y[j] - mean;
-            noise[j] += (variance - slope * slope).max(0.0);
-            let slope = slope / covariance[j * p + j].sqrt();
-            for output in outputs.iter_mut().skip(j).step_by(p) {
-                *output *= slope;
+        let covariance = self.covariance.numbers();
+        let bent = bent.select(N::all(1.0), N::ZERO);
+        let (twin, now) = row.at;
+        for (lane, now) in now.iter().enumerate().filter(|(l, _)| bent.lane(*l) != 0.0) {
+            let mut again: Vec<f64> = row.y.iter().map(|y| y.lane(lane)).collect();
+            twin.readout(now, &mut again);
+            for j in 0..p {
+                let nodes: [f64; NODES.len()] =
+                    std::array::from_fn(|i| self.read[i * p + j].lane(lane));
+                let y = row.y[j].lane(lane);
+                let noise = self.noise.numbers_mut()[j].lane_mut(lane);
+                let innovation = self.innovation.numbers_mut()[j].lane_mut(lane);
+                let miss = y - nodes[0];
+                let near = |a: f64, b: f64| (a - b) * (a - b) <= *noise;
+                if nodes.iter().all(|v| *v == nodes[0]) && !near(y, nodes[0]) && near(again[j], y) {
+                    // A step wider than what was expected, and another one was read: the signal is beside an edge. What the
+                    // sensor cannot read is not excused so.
+                    *innovation = miss;
+                    *noise += miss * miss;
+                    continue;
+                }
+                let values = || nodes.iter().zip(NODES);
+                let mean: f64 = values().map(|(v, (_, weight))| weight * v).sum();
+                let slope: f64 = values().map(|(v, (node, weight))| weight * node * v).sum();
+                let variance: f64 = values()
+                    .map(|(v, (_, weight))| weight * (v - mean).powi(2))
+                    .sum();
+                *innovation = y - mean;
+                *noise += (variance - slope * slope).max(0.0);
+                let slope = slope / covariance[j * p + j].lane(lane).sqrt();
+                for output in outputs.iter_mut().skip(j).step_by(p) {
+                    *output.lane_mut(lane) *= slope;
+                }
             }
         }
     }
 
-    /// Takes outputs that count for rounded ones, and for outliers. Off, no bit changes.
+    /// Takes outputs that are there for rounded ones, and for outliers.
     #[cold]
-    fn finished(
-        &mut self,
-        rounding: &[f64],
-        outliers: &[Outliers],
-        counts: impl Fn(usize) -> bool,
-    ) {
-        self.excess = 0.0;
-        for (j, step) in rounding.iter().enumerate() {
-            if *step > 0.0 && counts(j) {
-                self.round(j, *step);
-            }
-        }
-        for (j, outlier) in outliers.iter().enumerate() {
-            if outlier.probability > 0.0 && counts(j) {
-                self.strike(j, *outlier);
+    fn apply_readings(&mut self, readings: &[Readings], is_missing: impl Fn(usize) -> bool) {
+        self.excess = N::ZERO;
+        let p = self.size.outputs();
+        for (lane, readings) in readings.iter().enumerate() {
+            for j in (0..p).filter(|&j| !is_missing(j)) {
+                if readings.rounds(j) {
+                    self.apply_rounding(lane, j, readings.rounding[j]);
+                }
+                if let Some(outlier) = readings.outliers.get(j).filter(|o| o.probability > 0.0) {
+                    self.apply_outliers(lane, j, *outlier);
+                }
             }
         }
     }
 
-    /// Where an output is rounded, its density is the mean of N(ȳ, S) over a cell, and the signal is known to lie in it. Innovation and noise
+    /// Takes an output for rounded: its density is the mean of N(ȳ, S) over a cell, and the signal is known to lie in it. Innovation and noise
     /// are changed such that the state moves as the signal does:
     ///
     /// ```text
@@ -303,11 +347,9 @@ impl<S: Size> Update<S> {
     /// ```
     ///
     /// Exact in density, mean and variance for one output; for several, each is taken for itself.
-    fn round(&mut self, j: usize, step: f64) {
-        let p = self.size.outputs();
-        let (beside, covariance) = (self.beside.as_mut(), self.covariance.as_mut());
-        let innovation = &mut self.innovation.as_mut()[j];
-        let s = covariance[j * p + j];
+    fn apply_rounding(&mut self, lane: usize, j: usize, step: f64) {
+        let innovation = self.innovation.numbers_mut()[j].lane_mut(lane);
+        let s = self.covariance.numbers()[j * self.size.outputs() + j].lane(lane);
         // What is no number stays none, and ends the pass.
         if !innovation.is_finite() {
             return;
@@ -318,12 +360,11 @@ impl<S: Size> Update<S> {
         let seen = s / known;
         *innovation = s.sqrt() * cell.mean / known;
         let log = -0.5 * (seen.ln() + *innovation * *innovation / seen);
-        self.excess += cell.log_density - 0.5 * s.ln() - log;
-        beside[j * p + j] += seen - s;
-        covariance[j * p + j] = seen;
+        let excess = cell.log_density - 0.5 * s.ln() - log;
+        self.set_variance(lane, j, seen, excess);
     }
 
-    /// Where an output may be an outlier, its density is a mixture, and so is what it says about the state. The noise is
+    /// Takes an output for a possible outlier: its density is a mixture, and so is what it says about the state. The noise is
     /// widened such that the gain is the mixture's:
     ///
     /// ```text
@@ -331,12 +372,10 @@ impl<S: Size> Update<S> {
     /// ```
     ///
     /// Exact in density and mean for one output; for several, each is taken for itself.
-    fn strike(&mut self, j: usize, outlier: Outliers) {
-        let p = self.size.outputs();
-        let (beside, covariance) = (self.beside.as_mut(), self.covariance.as_mut());
-        let s = covariance[j * p + j];
+    fn apply_outliers(&mut self, lane: usize, j: usize, outlier: Outliers) {
+        let s = self.covariance.numbers()[j * self.size.outputs() + j].lane(lane);
         let wide = s + outlier.scale * outlier.scale;
-        let square = self.innovation.as_ref()[j].powi(2);
+        let square = self.innovation.numbers()[j].lane(lane).powi(2);
         let log = |variance: f64| -0.5 * (variance.ln() + square / variance);
         let probability = outlier.probability.min(1.0);
         let plain = (1.0 - probability).ln() + log(s);
@@ -344,55 +383,30 @@ impl<S: Size> Update<S> {
         let density = plain.max(struck) + (-(plain - struck).abs()).exp().ln_1p();
         let w = (struck - density).exp();
         let seen = ((1.0 - w) / s + w / wide).recip();
-        self.excess += density - log(seen);
-        beside[j * p + j] += seen - s;
-        covariance[j * p + j] = seen;
+        self.set_variance(lane, j, seen, density - log(seen));
     }
 
-    /// C.
-    #[inline(always)]
-    fn factor(&mut self) -> Option<()> {
-        let p = self.size.outputs();
-        let (covariance, factor) = (self.covariance.as_ref(), self.factor.as_mut());
-        let pivots = self.pivots.as_mut();
-        for i in 0..p {
-            for j in 0..=i {
-                let mut entry = covariance[i * p + j];
-                for k in 0..j {
-                    entry -= factor[i * p + k] * factor[j * p + k];
-                }
-                if i == j {
-                    // Also where it is NaN.
-                    if !(entry > 0.0 && entry < f64::INFINITY) {
-                        return None;
-                    }
-                    pivots[i] = entry;
-                    factor[i * p + i] = entry.sqrt();
-                } else {
-                    factor[i * p + j] = entry / factor[j * p + j];
-                }
-            }
-        }
-        Some(())
+    /// Sets the variance of output j, and adds what its density then lacks.
+    fn set_variance(&mut self, lane: usize, j: usize, variance: f64, excess: f64) {
+        let at = j * self.size.outputs() + j;
+        let covariance = self.covariance.numbers_mut()[at].lane_mut(lane);
+        *self.beside.numbers_mut()[at].lane_mut(lane) += variance - *covariance;
+        *covariance = variance;
+        *self.excess.lane_mut(lane) += excess;
     }
 
     /// K, then mean and covariance.
     #[inline(always)]
-    fn correct(
-        &mut self,
-        root: Columns<'_>,
-        outputs: &[f64],
-        (mean, cov): (&mut [f64], &mut [f64]),
-    ) {
+    fn correct(&mut self, root: Columns<'_, N>, outputs: &[N], (mean, cov): Moment<'_, N>) {
         let (n, p) = (self.size.states(), self.size.outputs());
         let (gain, factor) = (
-            &mut self.gain.as_mut()[..n * p],
-            &self.factor.as_ref()[..p * p],
+            &mut self.gain.numbers_mut()[..n * p],
+            &self.factor.numbers()[..p * p],
         );
-        let (beside, pivots) = (&self.beside.as_ref()[..p * p], self.pivots.as_ref());
-        let (innovation, standardised) = (self.innovation.as_ref(), self.standardised.as_ref());
+        let (beside, pivots) = (&self.beside.numbers()[..p * p], self.pivots.numbers());
+        let (innovation, standardised) = (self.innovation.numbers(), self.standardised.numbers());
         let slopes = || outputs.chunks_exact(p).step_by(2);
-        gain.fill(0.0);
+        gain.fill(N::ZERO);
         for (x, y) in root.each(n).zip(slopes()) {
             for i in 0..n {
                 for j in 0..p {
@@ -400,32 +414,33 @@ impl<S: Size> Update<S> {
                 }
             }
         }
+        let per_variance = pivots[0].recip();
         for (gain, mean) in gain.chunks_exact_mut(p).zip(mean) {
             if p == 1 {
-                gain[0] /= pivots[0];
+                gain[0] = gain[0] * per_variance;
                 *mean += gain[0] * innovation[0];
                 continue;
             }
             for i in 0..p {
                 for k in 0..i {
-                    gain[i] -= factor[i * p + k] * gain[k];
+                    gain[i] = gain[i] - factor[i * p + k] * gain[k];
                 }
-                gain[i] /= factor[i * p + i];
+                gain[i] = gain[i] / factor[i * p + i];
                 *mean += gain[i] * standardised[i];
             }
             for i in (0..p).rev() {
                 for k in i + 1..p {
-                    gain[i] -= factor[k * p + i] * gain[k];
+                    gain[i] = gain[i] - factor[k * p + i] * gain[k];
                 }
-                gain[i] /= factor[i * p + i];
+                gain[i] = gain[i] / factor[i * p + i];
             }
         }
-        let rest = &mut self.rest.as_mut()[..root.rank * n];
+        let rest = &mut self.rest.numbers_mut()[..root.rank * n];
         for ((rest, x), y) in (rest.chunks_exact_mut(n).zip(root.each(n))).zip(slopes()) {
             for i in 0..n {
                 rest[i] = x[i];
                 for j in 0..p {
-                    rest[i] -= gain[i * p + j] * y[j];
+                    rest[i] = rest[i] - gain[i * p + j] * y[j];
                 }
             }
         }

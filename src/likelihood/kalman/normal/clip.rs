@@ -1,11 +1,15 @@
 //! Mean and variance of a normal number that is held in an interval.
 
-use super::tail::Tail;
+use super::tail::tail;
+use crate::math::{Condition, Number};
 use crate::twin::Interval;
 
 /// Beyond this many standard deviations a limit is not felt: its share is below 2e-12.
-pub(in crate::likelihood::kalman) const UNFELT: f64 = 7.0;
+const UNFELT: f64 = 7.0;
 
+/// Holds each state in its interval; `scale` gets the factors of the covariances, if any limit is felt. Non-negative:
+/// the result is D·P·D plus what the variances have more than that.
+///
 /// Moments of c = clamp(x, a, b), x ~ N(m, s²):
 ///
 /// ```text
@@ -16,95 +20,103 @@ pub(in crate::likelihood::kalman) const UNFELT: f64 = 7.0;
 /// ```
 ///
 /// Source: Stein's lemma; the rectified normal is in Socci, Lee & Seung, "The rectified Gaussian distribution" (1997).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::likelihood::kalman) struct Clipped {
-    /// Mean.
-    pub mean: f64,
-    /// Variance; at least Z²·s².
-    pub variance: f64,
-    /// Z, the share of x that is inside.
-    pub inside: f64,
-}
-
-/// Moments of N(`mean`, `variance`) held in `limit`; `None` where the limit is not felt.
 #[inline(always)]
-pub(in crate::likelihood::kalman) fn clipped(
-    mean: f64,
-    variance: f64,
-    limit: Interval,
-) -> Option<Clipped> {
-    let (low, high) = (limit.low() - mean, limit.high() - mean);
-    let reach = UNFELT * UNFELT * variance;
-    if low < 0.0 && low * low > reach && high > 0.0 && high * high > reach {
-        return None;
-    }
-    Some(held(mean, variance, limit))
-}
-
-fn held(mean: f64, variance: f64, limit: Interval) -> Clipped {
-    if variance <= 0.0 {
-        return Clipped {
-            mean: limit.clamp(mean),
-            variance: 0.0,
-            inside: 1.0,
-        };
-    }
-    let sd = variance.sqrt();
-    let per_sd = 1.0 / sd;
-    let (low, high) = (
-        (limit.low() - mean) * per_sd,
-        (limit.high() - mean) * per_sd,
-    );
-    // An end that is not felt costs no special functions.
-    let end_of = |at: f64| match at > UNFELT {
-        true => Tail::NONE,
-        false => Tail::beyond(at),
-    };
-    let (below, above) = (end_of(-low), end_of(high));
-    let inside = (1.0 - below.share - above.share).max(0.0);
-    // c = m + s·clamp(z, α, β) for a standard normal z; infinite ends weigh nothing.
-    let end = |at: f64, share: f64| if at.is_finite() { at * share } else { 0.0 };
-    let first = end(low, below.share) + end(high, above.share) + below.density - above.density;
-    let second = end(low, end(low, below.share) + below.density)
-        + end(high, end(high, above.share) - above.density)
-        + inside;
-    Clipped {
-        mean: limit.clamp(mean + sd * first),
-        // Chernoff's inequality, lost only to rounding.
-        variance: (second - first * first).max(inside * inside) * variance,
-        inside,
-    }
-}
-
-/// Holds each state in its interval; `scale` gets the factors of the covariances, if any limit is felt. Non-negative:
-/// the result is D·P·D plus what the variances have more than that.
-#[inline(always)]
-pub(in crate::likelihood::kalman) fn clip(
-    mean: &mut [f64],
-    cov: &mut [f64],
+pub(in crate::likelihood::kalman) fn clip<N: Number>(
+    mean: &mut [N],
+    cov: &mut [N],
     limits: &[Interval],
-    scale: &mut [f64],
+    scale: &mut [N],
 ) -> bool {
     let n = mean.len();
     let (cov, limits, scale) = (&mut cov[..n * n], &limits[..n], &mut scale[..n]);
-    let mut felt = false;
+    let mut any = false;
     for i in 0..n {
-        let Some(held) = clipped(mean[i], cov[i * n + i], limits[i]) else {
+        let variance = cov[i * n + i];
+        let (low, high) = (
+            N::all(limits[i].low()) - mean[i],
+            N::all(limits[i].high()) - mean[i],
+        );
+        let reach = variance * (UNFELT * UNFELT);
+        let free_below = low.below(N::ZERO) & reach.below(low * low);
+        let felt = !(free_below & N::ZERO.below(high) & reach.below(high * high));
+        if !felt.any() {
             continue;
-        };
-        if !felt {
-            felt = true;
-            scale.fill(1.0);
         }
+        if !any {
+            any = true;
+            scale.fill(N::all(1.0));
+        }
+        let held = match N::LANES {
+            1 => held_apart(mean[i], variance, felt, limits[i]),
+            _ => held(mean[i], variance, felt, limits[i]),
+        };
         scale[i] = held.inside;
         mean[i] = held.mean;
         for j in 0..n {
-            cov[i * n + j] *= held.inside;
-            cov[j * n + i] *= held.inside;
+            cov[i * n + j] = cov[i * n + j] * held.inside;
+            cov[j * n + i] = cov[j * n + i] * held.inside;
         }
         cov[i * n + i] = held.variance;
     }
-    felt
+    any
+}
+
+/// Mean, variance (at least Z²·s²) and Z, the share of x that is inside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Clipped<N> {
+    mean: N,
+    variance: N,
+    inside: N,
+}
+
+/// [`held`], out of the loops of one number.
+#[inline(never)]
+fn held_apart<N: Number>(mean: N, variance: N, felt: N::Condition, limit: Interval) -> Clipped<N> {
+    held(mean, variance, felt, limit)
+}
+
+/// Moments of N(`mean`, `variance`) held in `limit`, where it is felt; elsewhere as they are.
+#[inline(always)]
+fn held<N: Number>(mean: N, variance: N, felt: N::Condition, limit: Interval) -> Clipped<N> {
+    let (zero, one, unfelt) = (N::ZERO, N::all(1.0), N::all(UNFELT));
+    let varies = felt & zero.below(variance);
+    // Lanes that feel nothing, or do not vary, compute harmless numbers.
+    let v = varies.select(variance, one);
+    let sd = v.sqrt();
+    let per_sd = sd.recip();
+    let (low, high) = (
+        (N::all(limit.low()) - mean) * per_sd,
+        (N::all(limit.high()) - mean) * per_sd,
+    );
+    // An end that is not felt costs no special functions; an infinite end never is.
+    let felt_low = varies & !unfelt.below(-low);
+    let felt_high = varies & !unfelt.below(high);
+    let (mut first, mut second, mut outside) = (zero, zero, zero);
+    if felt_low.any() {
+        let (share, density) = tail(felt_low.select(-low, unfelt));
+        let low = felt_low.select(low, zero);
+        first += felt_low.select(low * share + density, zero);
+        second += felt_low.select(low * (low * share + density), zero);
+        outside += felt_low.select(share, zero);
+    }
+    if felt_high.any() {
+        let (share, density) = tail(felt_high.select(high, unfelt));
+        let high = felt_high.select(high, zero);
+        first += felt_high.select(high * share - density, zero);
+        second += felt_high.select(high * (high * share - density), zero);
+        outside += felt_high.select(share, zero);
+    }
+    let inside = (one - outside).max(zero);
+    second += inside;
+    let clamped = varies.select(mean + sd * first, mean);
+    let clamped = N::all(limit.high()).min(N::all(limit.low()).max(clamped));
+    // Chernoff's inequality, lost only to rounding.
+    let spread = (second - first * first).max(inside * inside) * v;
+    Clipped {
+        mean: felt.select(clamped, mean),
+        variance: felt.select(varies.select(spread, zero), variance),
+        inside: varies.select(inside, one),
+    }
 }
 
 #[cfg(test)]
@@ -126,14 +138,14 @@ mod tests {
             let (steps, mut sums) = (400_000, [0.0f64; 4]);
             for k in 0..=steps {
                 let z = -10.0 + 20.0 * f64::from(k) / f64::from(steps);
-                let weight = Tail::beyond(z).density * 20.0 / f64::from(steps);
+                let weight = tail(z).1 * 20.0 / f64::from(steps);
                 let (x, c) = (mean + sd * z, limit.clamp(mean + sd * z));
                 for (sum, value) in sums.iter_mut().zip([1.0, c, c * c, c * (x - mean)]) {
                     *sum += weight * value;
                 }
             }
             let [_, first, second, cross] = sums;
-            let held = clipped(mean, sd * sd, limit).unwrap();
+            let held = held(mean, sd * sd, true, limit);
             assert!((held.mean - first).abs() < 1e-6, "{held:?} {first}");
             assert!((held.variance - (second - first * first)).abs() < 1e-6);
             assert!((held.inside * sd * sd - cross).abs() < 1e-5);
@@ -143,11 +155,11 @@ mod tests {
     #[test]
     fn far_limits_are_not_felt_and_known_states_are_clamped() {
         let limit = Interval::new(0.0, 10.0).unwrap();
-        assert_eq!(clipped(5.0, 0.4, limit), None);
-        let held = clipped(-3.0, 0.0, limit).unwrap();
-        assert_eq!((held.mean, held.variance), (0.0, 0.0));
+        assert!(!clip(&mut [5.0], &mut [0.4], &[limit], &mut [0.0]));
+        let known = held(-3.0, 0.0, true, limit);
+        assert_eq!((known.mean, known.variance), (0.0, 0.0));
         // So far outside that nothing of it is inside.
-        let held = clipped(-50.0, 1.0, limit).unwrap();
+        let held = held(-50.0, 1.0, true, limit);
         assert!(held.mean.abs() < 1e-12 && held.variance < 1e-12 && held.inside < 1e-12);
     }
 

@@ -1,18 +1,10 @@
 //! The tail of the normal distribution.
 
+use crate::math::{Condition, Number};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// Tail probability of a standard normal number, and its density there.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::likelihood::kalman) struct Tail {
-    /// Φ(−z).
-    pub share: f64,
-    /// φ(z).
-    pub density: f64,
-}
-
 /// 1/√(2π).
-pub(in crate::likelihood::kalman) const DENSITY: f64 = 0.398_942_280_401_432_7;
+const DENSITY: f64 = 0.398_942_280_401_432_7;
 
 /// (1 + 2·x)·erfcx(x) on [0, 5] by powers of s = 2.2 − 9.6/(x + 3), by Chebyshev interpolation; relative error 5e-17.
 const SCALED: [f64; 18] = [
@@ -36,37 +28,32 @@ const SCALED: [f64; 18] = [
     8.915_587_253_124_454e-11,
 ];
 
-impl Tail {
-    /// Infinitely far out.
-    pub const NONE: Self = Self {
-        share: 0.0,
-        density: 0.0,
-    };
-
-    /// Beyond `z`, to rounding for z up to 7; further out to an absolute 1e-14.
-    ///
-    /// Share and density have the exponential in common, and erfcx(x) = exp(x²)·erfc(x) is so smooth that one
-    /// polynomial does for all x. Source of the form: Shepherd & Laframboise, *Mathematics of Computation* 36 (1981).
-    pub fn beyond(z: f64) -> Self {
-        let scale = (-0.5 * z * z).exp();
-        let x = (z.abs() * FRAC_1_SQRT_2).min(5.0);
-        let half = 0.5 * scale * polynomial(2.2 - 9.6 / (x + 3.0)) / (1.0 + 2.0 * x);
-        Self {
-            share: if z < 0.0 { 1.0 - half } else { half },
-            density: DENSITY * scale,
-        }
-    }
+/// Φ(−z) and φ(z): tail probability of a standard normal number beyond `z`, to rounding for z up to 7, further out to an absolute 1e-14;
+/// and its density there.
+///
+/// Share and density have the exponential in common, and erfcx(x) = exp(x²)·erfc(x) is so smooth that one
+/// polynomial does for all x. Source of the form: Shepherd & Laframboise, *Mathematics of Computation* 36 (1981).
+#[inline(always)]
+pub(super) fn tail<N: Number>(z: N) -> (N, N) {
+    let scale = (z * z * -0.5).exp();
+    let x = (z.abs() * FRAC_1_SQRT_2).min(N::all(5.0));
+    let s = N::all(2.2) - N::all(9.6) / (x + N::all(3.0));
+    let half = scale * 0.5 * polynomial(s) / (x * 2.0 + N::all(1.0));
+    let share = z.below(N::ZERO).select(N::all(1.0) - half, half);
+    (share, scale * DENSITY)
 }
 
 /// By Estrin's scheme, whose products do not wait for each other.
 #[inline(always)]
-pub(in crate::likelihood::kalman) fn polynomial(s: f64) -> f64 {
+fn polynomial<N: Number>(s: N) -> N {
     let c = &SCALED;
-    let (s2, s4, s8) = (s * s, (s * s) * (s * s), (s * s * s * s) * (s * s * s * s));
-    let four = |i: usize| (c[i] + c[i + 1] * s) + (c[i + 2] + c[i + 3] * s) * s2;
+    let (s2, s4) = (s * s, (s * s) * (s * s));
+    let s8 = s4 * s4;
+    let two = |i: usize| N::all(c[i]) + s * c[i + 1];
+    let four = |i: usize| two(i) + two(i + 2) * s2;
     let low = four(0) + four(4) * s4;
     let high = four(8) + four(12) * s4;
-    low + high * s8 + (c[16] + c[17] * s) * (s8 * s8)
+    low + high * s8 + two(16) * (s8 * s8)
 }
 
 #[cfg(test)]
@@ -95,14 +82,14 @@ mod tests {
             (6.0, 9.86587645037698e-10),
             (7.0, 1.279812543885835e-12),
         ] {
-            let found = Tail::beyond(z);
-            let error = (found.share - expected).abs();
+            let (share, density) = tail(z);
+            let error = (share - expected).abs();
             assert!(error < 4e-15 * expected, "{z}: {error}");
-            let density = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
-            assert!((found.density - density).abs() <= 1e-15 * density);
+            let expected = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+            assert!((density - expected).abs() <= 1e-15 * expected);
         }
-        assert!(Tail::beyond(50.0).share < 1e-14 && Tail::beyond(-50.0).share == 1.0);
-        assert_eq!(Tail::beyond(f64::NEG_INFINITY).share, 1.0);
-        assert!(Tail::beyond(f64::NAN).share.is_nan());
+        assert!(tail(50.0).0 < 1e-14 && tail(-50.0).0 == 1.0);
+        assert_eq!(tail(f64::NEG_INFINITY).0, 1.0);
+        assert!(tail(f64::NAN).0.is_nan());
     }
 }

@@ -133,16 +133,10 @@ impl<'a> Kalman<'a> {
         })
     }
 
-    /// Holds the states in their limits; whether covariances were scaled.
-    #[inline(always)]
-    pub(super) fn hold(&self, mean: &mut [f64], cov: &mut [f64], scale: &mut [f64]) -> bool {
-        clip(mean, cov, &self.limits, scale)
-    }
-
-    /// A state as it is told to people: within its limits.
-    pub(super) fn told(&self, mut state: Gaussian) -> Gaussian {
+    /// Returns a state held in its limits, as people see it.
+    pub(super) fn held_in_limits(&self, mut state: Gaussian) -> Gaussian {
         let mut scale = vec![1.0; self.states];
-        self.hold(&mut state.mean, &mut state.cov, &mut scale);
+        clip(&mut state.mean, &mut state.cov, &self.limits, &mut scale);
         state
     }
 }

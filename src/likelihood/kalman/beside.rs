@@ -1,16 +1,25 @@
-//! The filter at eight parameters at once.
+//! Filters side by side: up to eight pairs of parameters and record at once.
 //!
-//! Each number of the recursion is eight numbers side by side ([`Lanes`]), one for each θ, which the processor handles
-//! together. The twin's equations stay plain f64 and are called for one lane after the other.
+//! Each number of the recursion is eight numbers ([`Lanes`]), one for each θ, which the processor handles together. The twin's equations stay
+//! plain f64 and are called for one lane after the other.
 
-#![allow(clippy::needless_range_loop)] // indices, as in the formulas
-
-mod clip;
-mod pass;
-
+use super::number::MOST_STATES;
+use super::order::Order;
+use super::pass::{FilterJob, Innovation, Pass, Sink};
+use super::size::{Size, with_size};
+use super::update::Readings;
 use super::{Kalman, Method};
-use crate::math::{LANES, Lanes, widest};
-use pass::{Job, Pass, Rows};
+use crate::math::{Kernel, LANES, Lanes, widest};
+
+/// Innovation and its variance, row by row; 0 and 1 where the output is missing.
+pub(super) type LaneRows = Vec<[Lanes; 2]>;
+
+impl Sink<Lanes> for LaneRows {
+    #[inline(always)]
+    fn innovation(&mut self, _: usize, of: &Innovation<'_, Lanes>) {
+        self.push([of.innovation[0], of.covariance[0]]);
+    }
+}
 
 /// Rows of up to eight filters run side by side.
 pub(super) struct Together {
@@ -18,8 +27,7 @@ pub(super) struct Together {
     lanes: Vec<Option<usize>>,
     /// log p(y | θ) of each lane, in nats.
     pub log_likelihoods: Lanes,
-    /// Innovation and its variance of each row.
-    pub rows: Rows,
+    pub rows: LaneRows,
 }
 
 impl Together {
@@ -32,7 +40,7 @@ impl Together {
 impl Kalman<'_> {
     /// Returns whether lanes can hold this filter.
     fn fits_lanes(&self) -> bool {
-        (1..=4).contains(&self.states)
+        (1..=MOST_STATES).contains(&self.states)
             && self.channels == 1
             && self.settings.method == Method::Points
     }
@@ -55,17 +63,20 @@ pub(super) fn together(all: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
         return None;
     }
     let all = &all[..all.len().min(LANES)];
-    let held: Vec<Option<Job<'_>>> = (all.iter())
+    let orders: Vec<Option<Order<'_>>> = (all.iter())
         .map(|&(kalman, theta)| {
-            let acting = kalman.acting(theta).ok()?;
-            let dead_time = (kalman.twin).dead_time(theta, kalman.record.drive().dt());
-            let plain = (kalman.twin.outliers(theta).is_empty())
-                && kalman.twin.rounding(theta).is_empty()
-                && dead_time.is_empty();
-            plain.then_some(Job {
+            let order = Order::of(kalman, theta).ok()?;
+            let is_plain = Readings::of(kalman.twin, theta).is_none() && order.before == 0;
+            is_plain.then_some(order)
+        })
+        .collect();
+    let held: Vec<Option<FilterJob<'_>>> = (all.iter().zip(&orders))
+        .map(|(&(kalman, theta), order)| {
+            Some(FilterJob {
                 kalman,
+                order: order.as_ref()?,
                 theta,
-                acting,
+                acting: kalman.acting(theta).ok()?,
             })
         })
         .collect();
@@ -73,23 +84,39 @@ pub(super) fn together(all: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
     let lanes = (held.iter())
         .map(|job| job.as_ref().and_then(|_| used.next()))
         .collect();
-    let jobs: Vec<Job<'_>> = held.into_iter().flatten().collect();
+    let jobs: Vec<FilterJob<'_>> = held.into_iter().flatten().collect();
     if jobs.is_empty() {
         return None;
     }
     let mut rows = Vec::with_capacity(first.record.samples());
     let (jobs, to) = (&jobs[..], &mut rows);
-    let log_likelihoods = match first.states {
-        1 => widest(Pass::<1, 5> { jobs, rows: to }),
-        2 => widest(Pass::<2, 18> { jobs, rows: to }),
-        3 => widest(Pass::<3, 39> { jobs, rows: to }),
-        _ => widest(Pass::<4, 68> { jobs, rows: to }),
-    }?;
+    let log_likelihoods = with_size!(
+        (first.states, first.channels),
+        [1 2 3 4],
+        |size| widest(SideBySide { size, jobs, to }),
+        None
+    )?;
     Some(Together {
         lanes,
         log_likelihoods,
         rows,
     })
+}
+
+/// A pass of several jobs; `None` where all fail.
+struct SideBySide<'p, S> {
+    size: S,
+    jobs: &'p [FilterJob<'p>],
+    to: &'p mut LaneRows,
+}
+
+impl<S: Size> Kernel for SideBySide<'_, S> {
+    type Output = Option<Lanes>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Lanes> {
+        Pass::new(self.size, self.jobs).run(self.to).ok()
+    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,113 @@
+//! Calls of the twin by a filter, whose numbers are one or those of several filters side by side. The twin's equations are plain f64.
+
+use crate::math::{Lanes, Mask, Number};
+use crate::twin::{Interval, LanePoints, Layout, Now, Points, StateSpace, Workspace};
+
+/// States of filters that run side by side, at most.
+pub(super) const MOST_STATES: usize = 4;
+
+/// A number that a filter computes with.
+pub(super) trait FilterNumber: Number {
+    /// Puts points into the limits and carries them over a step; the lanes in which a constraint acted.
+    fn advance(call: Call<'_, '_>, points: MovingPoints<'_, Self>) -> Self::Condition;
+    /// Outputs, `p` each, of points of `n` states each.
+    fn observe(call: Call<'_, '_>, n: usize, p: usize, points: &[Self], outputs: &mut [Self]);
+    /// Noise levels; both come with any numbers.
+    fn noise(at: Asked<'_, '_>, process: &mut [Self], measurement: &mut [Self]);
+    /// Puts outputs, `p` each, through the readout; the lanes in which it changed any.
+    fn readout(at: Asked<'_, '_>, p: usize, outputs: &mut [Self]) -> Self::Condition;
+}
+
+/// A twin, and where its filters are: one view for each lane in use.
+pub(super) type Asked<'c, 'n> = (&'c dyn StateSpace, &'c [Now<'n>]);
+
+/// The same, with buffers.
+pub(super) struct Call<'c, 'n> {
+    pub twin: &'c dyn StateSpace,
+    pub now: &'c [Now<'n>],
+    pub buffers: &'c mut Buffers,
+}
+
+/// Buffers of calls to a twin.
+pub(super) struct Buffers {
+    work: Workspace,
+    one: Vec<f64>,
+    shift: Vec<f64>,
+}
+
+impl Buffers {
+    pub fn new(twin: &dyn StateSpace, n: usize) -> Self {
+        Self {
+            work: Workspace::new(twin),
+            one: vec![0.0; (1 + 4 * n) * n],
+            shift: vec![0.0; n],
+        }
+    }
+}
+
+/// Points to be carried; see [`Points`].
+pub(super) struct MovingPoints<'w, N> {
+    pub all: &'w mut [N],
+    pub moving: usize,
+    pub limits: &'w [Interval],
+    pub shifts: &'w [N],
+}
+
+impl FilterNumber for f64 {
+    #[inline(always)]
+    fn advance(call: Call<'_, '_>, points: MovingPoints<'_, Self>) -> bool {
+        let points = Points {
+            all: points.all,
+            moving: points.moving,
+            limits: points.limits,
+            shifts: points.shifts,
+        };
+        (call.twin).advance_each(&call.now[0], points, &mut call.buffers.work)
+    }
+    #[inline(always)]
+    fn observe(call: Call<'_, '_>, n: usize, p: usize, points: &[f64], outputs: &mut [f64]) {
+        (call.twin).observe_each(&call.now[0], Layout::dense(n), p, points, outputs);
+    }
+    #[inline(always)]
+    fn noise((twin, now): Asked<'_, '_>, process: &mut [f64], measurement: &mut [f64]) {
+        process.fill(0.0);
+        measurement.fill(0.0);
+        twin.noise(&now[0], process, measurement);
+    }
+    #[inline(always)]
+    fn readout((twin, now): Asked<'_, '_>, p: usize, outputs: &mut [f64]) -> bool {
+        twin.readout_each(&now[0], p, outputs)
+    }
+}
+
+/// One output.
+impl FilterNumber for Lanes {
+    #[inline(always)]
+    fn advance(call: Call<'_, '_>, points: MovingPoints<'_, Self>) -> Mask {
+        let Buffers { work, one, shift } = call.buffers;
+        let points = LanePoints {
+            all: points.all,
+            limits: points.limits,
+            shifts: points.shifts,
+            one,
+            shift,
+        };
+        let bent = call.twin.advance_lanes(call.now, points, work);
+        Mask::of(|lane| bent[lane])
+    }
+    #[inline(always)]
+    fn observe(call: Call<'_, '_>, n: usize, _: usize, points: &[Self], outputs: &mut [Self]) {
+        let buffer = &mut call.buffers.one;
+        call.twin
+            .observe_lanes(call.now, n, points, outputs, buffer);
+    }
+    #[inline(always)]
+    fn noise((twin, now): Asked<'_, '_>, process: &mut [Self], measurement: &mut [Self]) {
+        twin.noise_lanes(now, process, &mut measurement[0]);
+    }
+    #[inline(always)]
+    fn readout((twin, now): Asked<'_, '_>, _: usize, outputs: &mut [Self]) -> Mask {
+        let changed = twin.readout_lanes(now, outputs);
+        Mask::of(|lane| changed[lane])
+    }
+}
