@@ -1,17 +1,10 @@
 //! Turns errors into one line and an exit code.
 
-use super::remedy::with_remedy;
+use super::remedy::{Cause, Remedy};
 use super::say::say;
-use crate::estimator::EstimatorError;
-use crate::evaluate::EvaluateError;
-use crate::feature::FeatureError;
-use crate::network::NetworkError;
-use crate::record::RecordError;
-use crate::storage::StorageError;
 use crate::storage::untrusted::one_line;
 use crate::storage::work::Ranks;
 use crate::study::StudyError;
-use crate::twin::{SimulationError, TwinError};
 use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
@@ -71,9 +64,8 @@ impl Failure {
     /// Creates a failure that the user cannot fix.
     pub fn internal(message: impl Display) -> Self {
         Self {
-            message: message.to_string(),
             code: INTERNAL,
-            about_study: false,
+            ..Self::user(message)
         }
     }
 
@@ -88,9 +80,8 @@ impl Failure {
     /// Creates the failure of a call that the user has stopped.
     pub fn stopped(message: impl Display, code: u8) -> Self {
         Self {
-            message: message.to_string(),
             code,
-            about_study: false,
+            ..Self::user(message)
         }
     }
 
@@ -167,72 +158,16 @@ impl Failure {
     }
 }
 
-/// Errors that only the user's input can cause.
-macro_rules! users {
-    ($($error:ty),* $(,)?) => {
-        $(impl From<$error> for Failure {
-            fn from(error: $error) -> Self {
-                Self::user(with_remedy(&error))
-            }
-        })*
-    };
-}
-users!(RecordError, StorageError, TwinError);
-
-impl From<SimulationError> for Failure {
-    fn from(error: SimulationError) -> Self {
-        Self::user(error)
-    }
-}
-
-impl From<FeatureError> for Failure {
-    fn from(error: FeatureError) -> Self {
-        Self::study(error)
-    }
-}
-
-impl From<StudyError> for Failure {
-    fn from(error: StudyError) -> Self {
-        match error {
-            StudyError::Cancelled(_) => Self::internal(error),
-            _ => Self::study(with_remedy(&error)),
-        }
-    }
-}
-
-impl From<EvaluateError> for Failure {
-    fn from(error: EvaluateError) -> Self {
-        match error {
-            EvaluateError::Cancelled(_) => Self::internal(error),
-            EvaluateError::NoDeparture { .. }
-            | EvaluateError::NoTruth { .. }
-            | EvaluateError::Plan(_) => Self::study(with_remedy(&error)),
-            _ => Self::user(with_remedy(&error)),
-        }
-    }
-}
-
-impl From<NetworkError> for Failure {
-    fn from(error: NetworkError) -> Self {
-        match error {
-            NetworkError::Backend(_) | NetworkError::Cancelled(_) => Self::internal(error),
-            _ => Self::user(error),
-        }
-    }
-}
-
-impl From<EstimatorError> for Failure {
-    fn from(error: EstimatorError) -> Self {
-        use EstimatorError as E;
-        match error {
-            E::Study(error) => error.into(),
-            E::Feature(error) => error.into(),
-            E::Network(error) => error.into(),
-            E::Cancelled(_) | E::Search(_) | E::Cloud(_) => Self::internal(error),
-            E::Simulation(_) | E::Rejected(_) | E::Hopeless { .. } | E::Inputs(_) => {
-                Self::study(error)
-            }
-            _ => Self::user(with_remedy(&error)),
+impl<E: Remedy + Display> From<E> for Failure {
+    fn from(error: E) -> Self {
+        let message = match error.remedy() {
+            Some(remedy) => format!("{error} ({remedy})"),
+            None => error.to_string(),
+        };
+        match error.cause() {
+            Cause::Call => Self::user(message),
+            Cause::Study => Self::study(message),
+            Cause::Internal => Self::internal(message),
         }
     }
 }

@@ -4,16 +4,51 @@
 
 use crate::estimator::EstimatorError;
 use crate::evaluate::EvaluateError;
+use crate::feature::FeatureError;
+use crate::network::NetworkError;
 use crate::record::RecordError;
 use crate::setting::number;
 use crate::storage::StorageError;
 use crate::study::StudyError;
-use crate::twin::TwinError;
+use crate::twin::{SimulationError, TwinError};
 
-/// An error that the command line has a remedy for.
+/// Where an error comes from.
+pub(super) enum Cause {
+    /// The call or one of its files.
+    Call,
+    /// As [`Call`](Self::Call), most likely the study file.
+    Study,
+    /// The program itself, or a stop.
+    Internal,
+}
+
+/// An error as the command line reports it.
 pub(super) trait Remedy {
     /// Returns options, verbs or tables that help.
-    fn remedy(&self) -> Option<String>;
+    fn remedy(&self) -> Option<String> {
+        None
+    }
+
+    fn cause(&self) -> Cause {
+        Cause::Call
+    }
+}
+
+impl Remedy for SimulationError {}
+
+impl Remedy for FeatureError {
+    fn cause(&self) -> Cause {
+        Cause::Study
+    }
+}
+
+impl Remedy for NetworkError {
+    fn cause(&self) -> Cause {
+        match self {
+            Self::Backend(_) | Self::Cancelled(_) => Cause::Internal,
+            _ => Cause::Call,
+        }
+    }
 }
 
 impl Remedy for RecordError {
@@ -96,6 +131,13 @@ impl Remedy for StudyError {
             _ => return None,
         })
     }
+
+    fn cause(&self) -> Cause {
+        match self {
+            Self::Cancelled(_) => Cause::Internal,
+            _ => Cause::Study,
+        }
+    }
 }
 
 impl Remedy for EstimatorError {
@@ -107,6 +149,19 @@ impl Remedy for EstimatorError {
             Self::Whitening(_) => "[noise] of the study file".into(),
             _ => return None,
         })
+    }
+
+    fn cause(&self) -> Cause {
+        match self {
+            Self::Study(error) => error.cause(),
+            Self::Feature(error) => error.cause(),
+            Self::Network(error) => error.cause(),
+            Self::Cancelled(_) | Self::Search(_) | Self::Cloud(_) => Cause::Internal,
+            Self::Simulation(_) | Self::Rejected(_) | Self::Hopeless { .. } | Self::Inputs(_) => {
+                Cause::Study
+            }
+            _ => Cause::Call,
+        }
     }
 }
 
@@ -126,12 +181,12 @@ impl Remedy for EvaluateError {
             _ => return None,
         })
     }
-}
 
-/// An error in one line, with the command line's remedy.
-pub(super) fn with_remedy(error: &(impl Remedy + std::fmt::Display)) -> String {
-    match error.remedy() {
-        Some(remedy) => format!("{error} ({remedy})"),
-        None => error.to_string(),
+    fn cause(&self) -> Cause {
+        match self {
+            Self::Cancelled(_) => Cause::Internal,
+            Self::NoDeparture { .. } | Self::NoTruth { .. } | Self::Plan(_) => Cause::Study,
+            _ => Cause::Call,
+        }
     }
 }

@@ -4,6 +4,7 @@ use super::certificate::Side;
 use super::posterior::{Posterior, PosteriorRegion};
 use crate::record::Signal;
 use crate::twin::Noise;
+use crate::twin::Role;
 use serde::Serialize;
 
 /// Settings of a fit.
@@ -119,8 +120,8 @@ pub struct FittedNoise {
 pub struct Nuisance {
     /// State, output, or magnitude of an effect.
     pub name: String,
-    /// `start`, `noise` or `effect`.
-    pub role: &'static str,
+    /// A start, a noise level, or the magnitude of an effect.
+    pub role: Role,
     /// Estimate.
     pub value: f64,
     /// Standard error.

@@ -25,7 +25,7 @@ use truetwin::progress::Progress;
 use truetwin::record::{Drive, Quantity, Record, Signal};
 use truetwin::study::{RecordPlan, Study};
 use truetwin::twin::{
-    DigitalTwin, Interval, Noise, Now, Outline, Parameter, ParameterSpace, StateSpace,
+    DigitalTwin, Interval, Noise, Now, Outline, Parameter, ParameterSpace, Role, StateSpace,
 };
 use truetwin::twins::VanDerPol;
 

@@ -8,6 +8,7 @@ use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record, Signal};
 use truetwin::study::{RecordPlan, Study, StudyFile};
+use truetwin::twin::Role;
 
 /// Files that the tests read.
 const FILES: [&str; 4] = [
@@ -85,7 +86,10 @@ pub fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
         .into_iter()
         .map(|n| (n.name, n.role))
         .collect();
-    assert_eq!(nuisance, [("h1".into(), "start"), ("h2".into(), "start")]);
+    assert_eq!(
+        nuisance,
+        [("h1".into(), Role::Start), ("h2".into(), Role::Start)]
+    );
 }
 
 /// These tanks overflow at the upper one, which the twin lacks. The share that closes is on a record that no fit has seen.

@@ -133,9 +133,12 @@ pub(in crate::diagnose) fn nuisance(
             let kind = j.checked_sub(own).map(|n| &kinds[n]);
             // Starts follow from the records, below.
             let role = match kind {
-                Some(_) => Role::Noise.nuisance()?,
-                None => p.role.nuisance().filter(|_| p.role != Role::Start)?,
+                Some(_) => Role::Noise,
+                None => p.role,
             };
+            if matches!(role, Role::Parameter | Role::Start) {
+                return None;
+            }
             Some(Nuisance {
                 name: kind.map_or(p.target(), String::as_str).to_owned(),
                 role,
@@ -160,7 +163,7 @@ pub(in crate::diagnose) fn nuisance(
                         0 => p.target().to_owned(),
                         r => format!("{} (record {})", p.target(), r + 1),
                     },
-                    role: "start",
+                    role: Role::Start,
                     value: own[j],
                     std_error: full[j],
                 });
@@ -178,7 +181,7 @@ pub(in crate::diagnose) fn nuisance(
                     1 => start.name,
                     r => format!("{} (record {r})", start.name),
                 },
-                role: "start",
+                role: Role::Start,
                 value: start.value,
                 std_error: start.std_error,
             }),

@@ -189,13 +189,12 @@ impl Estimate {
     /// Start states, noise levels and magnitudes among θ.
     pub fn nuisance(&self) -> Vec<Nuisance> {
         (0..self.names.len())
-            .filter_map(|j| {
-                Some(Nuisance {
-                    name: self.roles[j].target(&self.names[j]).into(),
-                    role: self.roles[j].nuisance()?,
-                    value: self.theta[j],
-                    std_error: self.std_error[j],
-                })
+            .filter(|j| self.roles[*j] != Role::Parameter)
+            .map(|j| Nuisance {
+                name: self.roles[j].target(&self.names[j]).into(),
+                role: self.roles[j],
+                value: self.theta[j],
+                std_error: self.std_error[j],
             })
             .collect()
     }

@@ -119,7 +119,7 @@ fn parameters(units: &Units, diagnosis: &Diagnosis) -> Section {
             let name = n.name.split(' ').next().unwrap_or(&n.name);
             vec![
                 n.name.clone(),
-                n.role.to_owned(),
+                n.role.nuisance().unwrap_or_default().to_owned(),
                 Digits::supported(n.value, n.std_error).write(n.value),
                 error(n.std_error),
                 unit_suffix(units.variable(name)).trim_start().to_owned(),

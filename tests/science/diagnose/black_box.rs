@@ -7,7 +7,7 @@ use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnos
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record, Signal};
 use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
+use truetwin::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, Role, SimulationError};
 
 /// A record of the boxed twin of that name with an effect, and its study.
 fn affected(name: &str, effect: &str, theta: &[f64], noise: Noise) -> (Study, Record) {
@@ -191,7 +191,7 @@ fn a_box_without_noise_is_no_trouble() {
         sound(&found);
         accused += u64::from(found.verdict == Verdict::StructuralGap);
         assert!((found.parameters[0].refitted - 2.1).abs() < 0.1);
-        assert_eq!(found.nuisance[0].role, "noise");
+        assert_eq!(found.nuisance[0].role, Role::Noise);
         let noise = found.nuisance[0].value;
         assert!(noise < 1.2 * std + 2e-3, "{noise}");
     }
