@@ -1,8 +1,7 @@
 //! Listed effects as hypotheses: their magnitudes in the units of the record.
 
 use super::magnitude::{Ranges, frequency};
-use super::scales::Scales;
-use super::size::largest;
+use super::scales::{Scales, largest};
 use super::term::{Nature, Part, Start, Term, with_terms};
 use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
@@ -230,7 +229,7 @@ fn bare(effect: &Effect, held: BTreeMap<String, f64>) -> Term {
     }
 }
 
-/// What outputs show of a term's free magnitudes, of those of its effect.
+/// Values that outputs show of a term's free magnitudes, of those of its effect.
 fn shown_free(term: &Term, shown: &[f64]) -> Vec<f64> {
     let Part::Effect { effect, held } = &term.part else {
         return vec![];

@@ -6,43 +6,36 @@
 //! | `listed.rs`, `alike.rs` | effects of the library, in the units of the record; those that are one term of the equations |
 //! | `unknown.rs`, `functions.rs`, `basis.rs` | unknown functions and disturbances at every place |
 //! | `noise.rs` | other kinds of noise |
-//! | `scales.rs`, `size.rs`, `magnitude.rs`, `frequencies.rs` | sizes of signals, states and rates; ranges of magnitudes; frequencies that residuals show |
-//! | `model.rs` | a twin with a set of terms, fitted: its evidence |
-//! | `screen.rs` | promise of each term along a grid of its magnitudes, before any fit |
-//! | `fits.rs`, `fold.rs`, `valleys.rs` | fits of a term from all starts: answered, annealed, from the prior's centre, unfolded, from other laws' tops |
-//! | `search.rs` | all terms screened, the promising ones fitted |
-//! | `effects.rs` | a fit with the effects of a study |
+//! | `scales.rs`, `magnitude.rs` | sizes of signals, states, rates and effects; ranges of magnitudes |
+//! | `search/` | all terms screened, the promising ones fitted |
+//! | `search/model.rs`, `explanation.rs` | a twin with a set of terms, fitted: its evidence |
+//! | `search/screen.rs` | promise of each term along a grid of its magnitudes, before any fit |
+//! | `search/fits.rs`, `fold.rs`, `valleys.rs` | fits of a term from all starts: answered, annealed, from the prior's centre, unfolded, from other laws' tops |
+//! | `search/breadth.rs`, `frequencies.rs` | how many terms are fitted; frequencies that residuals show |
+//! | `search/effects.rs` | a fit with the effects of a study |
 
 mod alike;
 pub(crate) mod basis;
 pub(crate) mod disturbed_equations;
 mod disturbed_signals;
-pub(crate) mod effects;
 mod entered;
 mod entered_black_box;
 pub(crate) mod entry;
-pub(crate) mod explanation;
-mod fits;
-mod fold;
-pub(crate) mod frequencies;
 pub(crate) mod functions;
 pub(crate) mod listed;
 mod magnitude;
-pub(crate) mod model;
 pub(crate) mod noise;
 pub(crate) mod scales;
-mod screen;
 pub(crate) mod search;
 pub(crate) mod set;
-mod size;
 pub(crate) mod term;
 pub(crate) mod unknown;
-mod valleys;
 
 use self::term::Term;
 use std::sync::Arc;
 
 pub(crate) use alike::merged;
+pub(crate) use search::{effects, explanation, frequencies, leave_valleys, model};
 
 /// Terms that several models hold.
 pub(crate) fn shared(terms: Vec<Term>) -> Vec<Arc<Term>> {

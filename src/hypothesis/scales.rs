@@ -3,8 +3,17 @@
 use crate::effect::TargetKind;
 use crate::math::deviation;
 use crate::record::{Record, Signal};
-use crate::twin::{Acting, Outline, Twin};
+use crate::twin::{Acting, Outline, Parameter, Twin};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
+
+/// Change of a magnitude whose consequences are looked at, as a share of where fits start; where those are far off, of what the rates vary.
+const SHARE: f64 = 1e-3;
+/// Changes of rates and outputs, as shares of what they vary, that neither rounding nor a bent law spoils.
+const SEEN: RangeInclusive<f64> = 1e-8..=0.1;
+/// Factor to a change that is seen from one that is not, and how often it is looked for.
+const FARTHER: f64 = 1e5;
+const LOOKS: usize = 5;
 
 /// Records, the states that the twin has along them, and how fast these move.
 pub(crate) struct Scales {
@@ -140,4 +149,121 @@ fn each_moment(
         }
     }
     Some(())
+}
+
+/// The size of entry `j` of the θ of equations at which rates or outputs change as much as they vary themselves, along filtered states; none where
+/// nothing changes.
+pub(super) fn largest(
+    twin: &Twin,
+    theta: &[f64],
+    (j, parameter): (usize, &Parameter),
+    records: &[Record],
+    states: &[Signal],
+) -> Option<f64> {
+    let prior = parameter.prior;
+    let mut step = SHARE * prior.high().abs().max(prior.low().abs());
+    for _ in 0..LOOKS {
+        let mut moved = theta.to_vec();
+        moved[j] = parameter.bounds.clamp(moved[j] + step);
+        step = moved[j] - theta[j];
+        if step == 0.0 {
+            return None;
+        }
+        let change = change(twin, [theta, &moved], records, states)?;
+        // Starts are for signals of size 1; those of others are lost in rounding, or bend the twin.
+        match change {
+            0.0 => step *= FARTHER,
+            c if SEEN.contains(&c) => return Some(step.abs() / c),
+            c if c.is_finite() => step *= SHARE / c,
+            _ => step /= FARTHER,
+        }
+    }
+    None
+}
+
+/// The largest change of a rate or an output from the first θ to the second along filtered states, as a share of what it varies itself
+/// (root mean squares). Rates count from zero, outputs from their mean. `None` without equations.
+fn change(twin: &Twin, thetas: [&[f64]; 2], records: &[Record], states: &[Signal]) -> Option<f64> {
+    let rates = twin.outline()?.states.len();
+    let mut all: [Vec<Vec<f64>>; 2] = [vec![], vec![]];
+    for (theta, rows) in thetas.iter().zip(&mut all) {
+        each_moment(
+            twin,
+            theta,
+            (records, states),
+            usize::MAX,
+            |rates, outputs| {
+                rows.push([rates, outputs].concat());
+            },
+        )?;
+    }
+    let [here, there] = all;
+    if here.len() != there.len() || here.is_empty() {
+        return Some(f64::NAN);
+    }
+    let share = |i: usize| {
+        let mean =
+            |f: &dyn Fn(usize) -> f64| (0..here.len()).map(f).sum::<f64>() / here.len() as f64;
+        let whole = mean(&|k| here[k][i].powi(2));
+        let centre = if i < rates {
+            0.0
+        } else {
+            mean(&|k| here[k][i])
+        };
+        let own = whole - centre * centre;
+        match own > 0.0 {
+            true => (mean(&|k| (there[k][i] - here[k][i]).powi(2)) / own).sqrt(),
+            false => 0.0,
+        }
+    };
+    Some((0..here[0].len()).map(share).fold(0.0, f64::max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Catalogue, augment};
+    use crate::record::Drive;
+    use crate::twin::{Now, Outline, StateSpace};
+
+    /// ẋ = g·(u − x), x in a unit of anybody's choice.
+    struct Level(f64);
+
+    impl StateSpace for Level {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("g", "1/s", 0.5, 2.0))
+                .state("x", "m")
+                .input("u", "m")
+                .output("y", "m")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = now.theta[0] * (now.u[0] - x[0]);
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0] / self.0;
+        }
+    }
+
+    /// The largest drag c·x² is as many times smaller as numbers are larger.
+    #[test]
+    fn the_largest_size_follows_the_unit() {
+        let of_unit = |unit: f64| {
+            let drag = Catalogue::default().effect("quadratic-drag", "x").unwrap();
+            let twin = augment(Twin::new(Level(unit)), vec![drag]).unwrap();
+            let rows = |phase: usize| {
+                Signal::from_shape_fn((50, 1), |(k, _)| unit * (1 + (k + phase) % 7) as f64)
+            };
+            let drive = Drive::new(0.1, rows(0)).unwrap();
+            let record = Record::new(drive, rows(3).mapv(|x| x / unit)).unwrap();
+            let space = twin.parameters();
+            let entry = (1, &space[1]);
+            largest(&twin, &[1.0, 0.0], entry, &[record], &[rows(3)]).unwrap()
+        };
+        let one = of_unit(1.0);
+        for unit in [1e-12, 1e-6, 1e3, 1e9] {
+            let ratio = of_unit(unit) * unit / one;
+            assert!((ratio - 1.0).abs() < 1e-3, "unit {unit:e}: {ratio}");
+        }
+    }
 }

@@ -4,9 +4,9 @@
 //! listed effect. An unknown function's coefficients have a score each, so that its evidence has a closed form.
 
 use super::model::{Extended, Model};
-use super::term::{Start, Term, marks};
 use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::reference::Reference;
+use crate::hypothesis::term::{Start, Term, marks};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use nalgebra::DVector;
 use rayon::prelude::*;

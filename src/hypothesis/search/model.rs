@@ -1,10 +1,10 @@
 //! A twin with terms, fitted to the records.
 
-use super::term::{Term, marks, with_terms};
 use crate::fit::axis::{EvidencePrior, Family};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::{CREDIT, Laplace, laplace};
 use crate::fit::problem::Problem;
+use crate::hypothesis::term::{Term, marks, with_terms};
 use crate::likelihood::kalman::FilterError;
 use crate::record::Signal;
 use crate::twin::Twin;

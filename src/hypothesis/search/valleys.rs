@@ -1,12 +1,12 @@
 //! Effects whose time, delay or frequency ended in a valley of its own.
 
+use super::breadth::{BETTER, CANDIDATES, NULL_LIKE};
 use super::explanation::Explanation;
 use super::fits::{CARRIED, settling_last};
-use super::magnitude::TIMES;
 use super::model::Model;
-use super::search::{BETTER, CANDIDATES, NULL_LIKE};
-use super::term::Term;
 use crate::fit::climb::{Fitted, climb, fit};
+use crate::hypothesis::magnitude::TIMES;
+use crate::hypothesis::term::Term;
 use crate::likelihood::kalman::FilterError;
 use rayon::prelude::*;
 

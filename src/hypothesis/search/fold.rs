@@ -9,8 +9,8 @@
 //!
 //! is the likeliest to be a motion. A record of it is one of the twin without the law, whose fit is a start beside the law.
 
-use super::term::{Part, Term};
 use crate::effect::{Effect, Instant, Law, TargetKind, targets};
+use crate::hypothesis::term::{Part, Term};
 use crate::record::{Record, Signal};
 use crate::twin::Twin;
 

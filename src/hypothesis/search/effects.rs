@@ -1,16 +1,16 @@
 //! A fit with the effects of a study: of the twin without them, then with one more at a time, the one that explains most first.
 
 use super::frequencies::frequencies;
-use super::listed::Library;
 use super::model::Model;
-use super::scales::Scales;
-use super::search::{Breadth, listed};
-use super::shared;
-use super::term::{Part, Term};
+use super::{Breadth, listed};
 use crate::effect::Effect;
 use crate::fit::axis::Axis;
 use crate::fit::problem::Problem;
 use crate::fit::{Searched, fits};
+use crate::hypothesis::listed::Library;
+use crate::hypothesis::scales::Scales;
+use crate::hypothesis::shared;
+use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::Measured;
 use crate::likelihood::kalman::FilterError;
 use crate::record::Record;

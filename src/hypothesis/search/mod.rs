@@ -1,30 +1,37 @@
 //! Search for what a model lacks: all hypotheses are screened, the promising ones refitted.
 
-use super::explanation::{Explanation, sort};
-use super::fits::{
-    CARRIED, Effort, anneal, fit_afresh, fit_function, fit_promise, fit_unfolded, loudly, release,
-};
-use super::model::Model;
-use super::screen::{Promise, functions, scan};
-use super::set::TermSet;
-use super::term::{Nature, Term, marks};
-use super::valleys::leave_valleys;
+mod breadth;
+pub(crate) mod effects;
+pub(crate) mod explanation;
+mod fits;
+mod fold;
+pub(crate) mod frequencies;
+pub(crate) mod model;
+mod screen;
+mod valleys;
+
+pub(crate) use breadth::{BETTER, Breadth, CANDIDATES, FEW, NULL_LIKE};
+pub(crate) use valleys::leave_valleys;
+
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::log_mean;
+use crate::hypothesis::set::TermSet;
+use crate::hypothesis::term::{Nature, Term, marks};
 use crate::likelihood::kalman::FilterError;
 use crate::math::median;
+use explanation::{Explanation, sort};
+use fits::{
+    CARRIED, Effort, anneal, fit_afresh, fit_function, fit_promise, fit_unfolded, loudly, release,
+};
+use model::Model;
 use rayon::prelude::*;
+use screen::{Promise, functions, scan};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Functions that are refitted, of those of one or two variables: what they promise says little of what a refit gains. With 5, the mean
-/// logarithm of the probability of the truth is −1.75 on open trials, with 12 −1.34, in 1.35 times the time.
-const FUNCTIONS: usize = 12;
 /// Starts of an effect with a time, a delay or a shape, each of which has a valley of its own, if it stands out. With 3, a delay beside a lag
 /// was 52 nats short on an open trial; 12 take 8 % more time in all.
 const STARTS_OF_SHAPE: usize = 12;
-/// Functions that are refitted where it is known about what is missing.
-pub(crate) const FEW: usize = 3;
 /// Nats that averaging over its size takes off an effect that nothing speaks for.
 const AVERAGED: f64 = 2.0;
 /// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
@@ -32,91 +39,6 @@ const PRICE_OF_FREQUENCY: f64 = 2.5;
 
 /// Nats below the best, with noise half-way down, from which an effect is given up: loud noise makes differences smaller than they will be.
 const LOST: f64 = 25.0;
-
-/// Distance to the best, in nats, within which a single effect may still be the explanation.
-pub(crate) const CANDIDATES: f64 = 6.0;
-/// Evidence up to which few hypotheses are refitted: nothing seems to be missing.
-pub(crate) const NULL_LIKE: f64 = 4.0;
-/// Evidence by which a fit from elsewhere must be better to count: fits end where they promise a hundredth of it.
-pub(crate) const BETTER: f64 = 1.0;
-/// Evidence from which fits begin with loud noise, too: where much is missing, the likelihood of quiet noise has narrow valleys.
-const DEEP: f64 = 30.0;
-
-/// Numbers of hypotheses that are refitted.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Breadth {
-    /// Listed effects in the first round.
-    pub listed: usize,
-    /// Listed effects that are fitted from loud noise.
-    pub annealed: usize,
-    /// Functions; of those of an output, of the past and of time, half as many.
-    pub functions: usize,
-    /// Nats that a screened hypothesis must promise.
-    pub least: f64,
-    /// True where much is missing, so that fits begin with loud noise, too.
-    pub deep: bool,
-    /// True if fits of listed effects begin at the prior's centre, too.
-    pub afresh: bool,
-    /// True if pairs of effects are searched.
-    pub pairs: bool,
-}
-
-impl Breadth {
-    /// As many as a twin's likelihood allows: that of a black box costs an ensemble. Few for a quick look.
-    pub fn of(model: &Model, quick: bool) -> Self {
-        let few = model.problem.is_simulated() || quick;
-        Self {
-            listed: 6,
-            annealed: if few { 0 } else { usize::MAX },
-            functions: if few { 2 } else { FUNCTIONS },
-            least: 2.5,
-            deep: false,
-            afresh: false,
-            pairs: !quick,
-        }
-    }
-
-    /// The same for a gap of so many nats, as unknown functions tell it.
-    pub fn for_gap(self, nats: f64) -> Self {
-        Self {
-            deep: nats > DEEP && self.annealed > 0,
-            ..self
-        }
-    }
-
-    /// The same, fits from the prior's centre as well, where a likelihood is cheap.
-    pub fn afresh(self) -> Self {
-        Self {
-            afresh: self.annealed > 0,
-            ..self
-        }
-    }
-
-    /// The same, every fit of every term where a likelihood is cheap.
-    pub fn thorough(self) -> Self {
-        Self {
-            deep: self.annealed > 0,
-            least: f64::NEG_INFINITY,
-            ..self.afresh().of_all()
-        }
-    }
-
-    /// The same, fewer functions: where it is known about what is missing.
-    pub fn few(self) -> Self {
-        Self {
-            functions: FEW.min(self.functions),
-            ..self
-        }
-    }
-
-    /// The same, every listed effect that promises something refitted.
-    pub fn of_all(self) -> Self {
-        Self {
-            listed: usize::MAX,
-            ..self
-        }
-    }
-}
 
 /// The best of terms that are one hypothesis used in several ways, which share its prior.
 fn merged(all: Vec<Explanation>, ways: &BTreeMap<String, usize>) -> Vec<Explanation> {

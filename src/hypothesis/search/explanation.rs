@@ -1,8 +1,8 @@
 //! One explanation of the records.
 
 use super::model::Model;
-use super::set::TermSet;
-use super::term::Term;
+use crate::hypothesis::set::TermSet;
+use crate::hypothesis::term::Term;
 use std::sync::Arc;
 
 /// A set of terms beside a twin, and how well it explains the records.
