@@ -35,7 +35,7 @@ use self::term::Term;
 use std::sync::Arc;
 
 pub(crate) use alike::merged;
-pub(crate) use search::{effects, explanation, frequencies, leave_valleys, model};
+pub(crate) use search::{effects, explanation, frequencies, model};
 
 /// Terms that several models hold.
 pub(crate) fn shared(terms: Vec<Term>) -> Vec<Arc<Term>> {

@@ -11,7 +11,6 @@ mod screen;
 mod valleys;
 
 pub(crate) use breadth::{BETTER, Breadth, CANDIDATES, FEW, NULL_LIKE};
-pub(crate) use valleys::leave_valleys;
 
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::log_mean;
@@ -28,6 +27,7 @@ use rayon::prelude::*;
 use screen::{Promise, functions, scan};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use valleys::leave_valleys;
 
 /// Starts of an effect with a time, a delay or a shape, each of which has a valley of its own, if it stands out. With 3, a delay beside a lag
 /// was 52 nats short on an open trial; 12 take 8 % more time in all.

@@ -31,7 +31,7 @@ type Start = (Vec<f64>, Vec<f64>);
 
 /// Fits effects again that may be better, `all` being sorted, best first: from where the same law ended at places where it explains more,
 /// with either sign of its size; the best ones from times nearby.
-pub(crate) fn leave_valleys(
+pub(super) fn leave_valleys(
     model: &Model,
     all: &mut [Explanation],
     floor: f64,
