@@ -6,7 +6,7 @@
 
 use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
-use crate::estimator::refine::Refined;
+use crate::estimator::refine::RefinedEstimate;
 use crate::fit::posterior::PosteriorRegion;
 use crate::math::{median, principal_axes};
 use crate::progress::Progress;
@@ -96,7 +96,7 @@ impl CloudSampler {
     /// This sampler around an estimate, `spread` times as wide as its covariance says.
     fn around(
         self,
-        refined: &Refined,
+        refined: &RefinedEstimate,
         space: &ParameterSpace,
         spread: f64,
     ) -> Result<Sampler, EstimatorError> {
@@ -193,7 +193,7 @@ pub struct Cloud<'a> {
     /// The record's input.
     pub drive: &'a Drive,
     /// Gauss–Newton's estimate.
-    pub refined: &'a Refined,
+    pub refined: &'a RefinedEstimate,
     /// Where the record puts θ, if the features are about its mean.
     pub region: Option<&'a PosteriorRegion>,
     /// Settings.

@@ -61,7 +61,7 @@ pub use error::EstimatorError;
 pub(crate) use estimate::Contributions;
 pub use estimate::{Estimate, EstimateOptions, PointEstimate, Refit, Together, Tracking};
 #[cfg(test)]
-pub(crate) use estimate::{Kept, Stages};
+pub(crate) use estimate::{KeptEstimate, Stages};
 pub use estimator::Estimator;
 pub use gate::{GateForm, GateOutcome, GateSettings};
 pub(crate) use pretrain::GivenBank;

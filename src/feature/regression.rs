@@ -1,7 +1,7 @@
 //! Least squares of a signal on its own past and that of other signals.
 
 use super::{FeatureError, FeatureMap, check_long, check_varies};
-use crate::math::{Fit, Lagged, LaggedSignals, LeastSquares, MathError, one_column};
+use crate::math::{Lagged, LaggedSignals, LeastSquares, MathError, Regression, one_column};
 use crate::record::{Drive, Signal};
 
 /// Coefficients of each output on its own last p values and the last q of each input:
@@ -43,7 +43,7 @@ impl FeatureMap for RegressionMap {
 }
 
 /// Regresses the first signal on the lags of all, from sample `start` on.
-pub(super) fn regress(signals: Vec<Lagged>, start: usize) -> Result<Fit, MathError> {
+pub(super) fn regress(signals: Vec<Lagged>, start: usize) -> Result<Regression, MathError> {
     let target = one_column(&signals[0].values[start..]);
     let phi = LaggedSignals::new(signals, start);
     LeastSquares::with_gram(&phi, &phi.gram())?.solve(&target)

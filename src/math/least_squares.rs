@@ -70,7 +70,7 @@ pub struct LeastSquares<'a, R = DMatrix<f64>> {
 
 /// Solution of [`LeastSquares::solve`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
+pub struct Regression {
     /// β, n × right sides, in units of y over units of Φ's column.
     pub coefficients: DMatrix<f64>,
     /// y − Φ β, m × right sides.
@@ -115,7 +115,7 @@ impl<'a, R: Regressors> LeastSquares<'a, R> {
     }
 
     /// Fits each column of `y`, m × right sides. [`MathError::NotFinite`] where an entry is not finite.
-    pub fn solve(&self, y: &DMatrix<f64>) -> Result<Fit, MathError> {
+    pub fn solve(&self, y: &DMatrix<f64>) -> Result<Regression, MathError> {
         let (m, n) = self.phi.shape();
         let mut coefficients = DMatrix::zeros(n, y.ncols());
         let mut residual = y.clone();
@@ -141,7 +141,7 @@ impl<'a, R: Regressors> LeastSquares<'a, R> {
         if !(residual.iter().chain(coefficients.iter())).all(|v| v.is_finite()) {
             return Err(MathError::NotFinite);
         }
-        Ok(Fit {
+        Ok(Regression {
             coefficients,
             residual,
         })
@@ -162,7 +162,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn fit(phi: &DMatrix<f64>, y: &DMatrix<f64>) -> Fit {
+    fn fit(phi: &DMatrix<f64>, y: &DMatrix<f64>) -> Regression {
         let gram = phi.transpose() * phi;
         LeastSquares::with_gram(phi, &gram)
             .unwrap()

@@ -32,7 +32,7 @@ pub(crate) use difference::Stencil;
 pub use error::MathError;
 pub(crate) use lagged::{Lagged, LaggedSignals};
 pub(crate) use lanes::{LANES, Lanes, Mask};
-pub(crate) use least_squares::{Fit, LeastSquares, Regressors};
+pub(crate) use least_squares::{LeastSquares, Regression, Regressors};
 pub(crate) use number::{Condition, Number};
 pub(crate) use principal_axes::principal_axes;
 pub(crate) use quantile::{median, quantile, rank_p_value};

@@ -42,7 +42,7 @@ pub struct Whitening {
 impl Whitening {
     /// Standardised, rank-revealing, nothing added. `samples` is K × n, one draw a row; they are finite and vary.
     pub fn calibrated(samples: &ArrayRef2<f64>) -> Result<Self, MathError> {
-        let Draws { mean, centred } = Draws::new(samples)?;
+        let CentredDraws { mean, centred } = CentredDraws::new(samples)?;
         // A constant feature has the rounding of its mean, at most K·ε of its size, as its standard deviation.
         let rounding = samples.nrows() as f64 * f64::EPSILON;
         let varying = |(feature, column): &(usize, f64)| {
@@ -93,7 +93,7 @@ impl Whitening {
 
     /// The paper's form, S + ε I with ε = `epsilon` > 0 in squared feature units. `samples` is K × n, one draw a row.
     pub fn regularised(samples: &ArrayRef2<f64>, epsilon: f64) -> Result<Self, MathError> {
-        let Draws { mean, centred } = Draws::new(samples)?;
+        let CentredDraws { mean, centred } = CentredDraws::new(samples)?;
         // Rows of zeros change no covariance, and give all n directions where there are fewer draws than features.
         let rows = centred.nrows().max(mean.len());
         let svd = thin_svd(&centred.resize_vertically(rows, 0.0)).ok_or(MathError::NotFinite)?;
@@ -161,12 +161,12 @@ impl Whitening {
 }
 
 /// Draws around their mean, divided by √(K − 1), so that `centredᵀ centred` is the covariance.
-struct Draws {
+struct CentredDraws {
     mean: DVector<f64>,
     centred: DMatrix<f64>,
 }
 
-impl Draws {
+impl CentredDraws {
     fn new(samples: &ArrayRef2<f64>) -> Result<Self, MathError> {
         let (draws, features) = samples.dim();
         if draws < 2 {
@@ -199,7 +199,7 @@ mod tests {
     }
 
     fn covariance(samples: &Array2<f64>) -> DMatrix<f64> {
-        let draws = Draws::new(samples).unwrap();
+        let draws = CentredDraws::new(samples).unwrap();
         draws.centred.tr_mul(&draws.centred)
     }
 

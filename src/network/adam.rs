@@ -29,12 +29,12 @@ pub(super) struct Adam {
     pub(super) steps: i32,
     weight_decay: f32,
     /// One for each tensor, in visiting order.
-    pub(super) moments: Vec<Moments>,
+    pub(super) moments: Vec<AdamMoments>,
 }
 
 /// The moving averages of a tensor's gradient and of its square.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Moments {
+pub(super) struct AdamMoments {
     pub first: Vec<f32>,
     pub second: Vec<f32>,
 }
@@ -47,15 +47,15 @@ impl Adam {
         }
     }
 
-    /// Begins a step; each module that trains then [updates](Step::update), always in the same order.
+    /// Begins a step; each module that trains then [updates](AdamStep::update), always in the same order.
     pub(super) fn step<'a>(
         &'a mut self,
         learning_rate: f64,
         gradients: &'a mut Gradients<f32, Cpu>,
-    ) -> Step<'a> {
+    ) -> AdamStep<'a> {
         self.steps += 1;
         let unbias = |beta: f32| 1.0 / (1.0 - f64::from(beta).powi(self.steps));
-        Step {
+        AdamStep {
             rate: (learning_rate * unbias(BETA1)) as f32,
             unbias_second: unbias(BETA2) as f32,
             next: 0,
@@ -66,7 +66,7 @@ impl Adam {
 }
 
 /// One step of [`Adam`], under way.
-pub(super) struct Step<'a> {
+pub(super) struct AdamStep<'a> {
     /// η/(1−β₁ᵗ).
     rate: f32,
     /// 1/(1−β₂ᵗ).
@@ -76,7 +76,7 @@ pub(super) struct Step<'a> {
     gradients: &'a mut Gradients<f32, Cpu>,
 }
 
-impl Step<'_> {
+impl AdamStep<'_> {
     /// Moves the tensors of `module`.
     pub(super) fn update<M: TensorCollection<f32, Cpu>>(
         &mut self,
@@ -87,7 +87,7 @@ impl Step<'_> {
     }
 }
 
-impl TensorVisitor<f32, Cpu> for Step<'_> {
+impl TensorVisitor<f32, Cpu> for AdamStep<'_> {
     type Viewer = ViewTensorMut;
     type Err = NetworkError;
     type E2 = f32;
@@ -103,7 +103,7 @@ impl TensorVisitor<f32, Cpu> for Step<'_> {
         }
         let count = tensor.shape().num_elements();
         if self.adam.moments.len() == self.next {
-            self.adam.moments.push(Moments {
+            self.adam.moments.push(AdamMoments {
                 first: vec![0.0; count],
                 second: vec![0.0; count],
             });

@@ -1,6 +1,6 @@
 //! A training that is interrupted goes on where it was, to the same bits.
 
-use super::adam::{Adam, Moments};
+use super::adam::{Adam, AdamMoments};
 use super::{History, NamedTensor, NetworkError, bytes_of, values_of};
 use crate::storage::files::{replace, sha256, with_remedy};
 use crate::storage::untrusted::read_kept;
@@ -30,10 +30,10 @@ const SECOND: &str = "second/";
 /// damaged or of another network counts as none, and the training begins anew. What else a training depends on (samples,
 /// settings, seed) is the caller's to compare before the state is gone on with.
 #[derive(Debug, Default)]
-pub struct Checkpoints(Option<Place>);
+pub struct Checkpoints(Option<CheckpointFile>);
 
 #[derive(Debug)]
-struct Place {
+struct CheckpointFile {
     path: PathBuf,
     every: Duration,
     last: Mutex<Instant>,
@@ -61,7 +61,7 @@ impl Position {
 }
 
 /// All that the rest of a training depends on, as it is kept.
-pub(super) struct State {
+pub(super) struct TrainingState {
     pub position: Position,
     pub weights: Vec<NamedTensor>,
     pub best: Vec<NamedTensor>,
@@ -71,7 +71,7 @@ pub(super) struct State {
 impl Checkpoints {
     /// Keeps the state in a file, each time that so long has passed.
     pub fn new(path: impl Into<PathBuf>, every: Duration) -> Self {
-        Self(Some(Place {
+        Self(Some(CheckpointFile {
             path: path.into(),
             every,
             last: Mutex::new(Instant::now()),
@@ -84,16 +84,16 @@ impl Checkpoints {
     }
 
     /// Loads the last checkpoint, if it can be used.
-    pub(super) fn load(&self, weight_decay: f64) -> Option<State> {
+    pub(super) fn load(&self, weight_decay: f64) -> Option<TrainingState> {
         let bytes = read_kept(&self.0.as_ref()?.path, MOST).ok()?;
-        State::parse(&bytes, weight_decay)
+        TrainingState::parse(&bytes, weight_decay)
     }
 
     /// Keeps a state, if it is time to, or if there will be no other time.
     pub(super) fn keep(
         &self,
         last_time: bool,
-        state: impl FnOnce() -> State,
+        state: impl FnOnce() -> TrainingState,
     ) -> Result<(), NetworkError> {
         let Some(place) = &self.0 else {
             return Ok(());
@@ -113,7 +113,7 @@ impl Checkpoints {
     }
 }
 
-impl State {
+impl TrainingState {
     fn bytes(&self) -> Result<Vec<u8>, String> {
         let mut tensors = Vec::new();
         for (prefix, list) in [(WEIGHTS, &self.weights), (BEST, &self.best)] {
@@ -174,7 +174,7 @@ impl State {
             moment(FIRST, adam.moments.len()),
             moment(SECOND, adam.moments.len()),
         ) {
-            adam.moments.push(Moments { first, second });
+            adam.moments.push(AdamMoments { first, second });
         }
         Some(Self {
             position,

@@ -13,7 +13,7 @@ use std::error::Error;
 const BLOCK: usize = 64 << 20;
 
 /// Features (rows × n) and targets (rows × d) of one part.
-pub type Part<'a> = (Cow<'a, Array2<f64>>, Cow<'a, Array2<f64>>);
+pub type SamplePart<'a> = (Cow<'a, Array2<f64>>, Cow<'a, Array2<f64>>);
 
 /// Rows of features and targets, both standardised, that need not fit into memory at once: they come in parts.
 ///
@@ -29,7 +29,7 @@ pub trait Samples: Sync {
     fn parts(&self) -> Vec<usize>;
 
     /// Part number `index`; it is asked for once an epoch.
-    fn part(&self, index: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>>;
+    fn part(&self, index: usize) -> Result<SamplePart<'_>, Box<dyn Error + Send + Sync>>;
 }
 
 /// Samples in memory.
@@ -46,14 +46,14 @@ impl Samples for (&Array2<f64>, &Array2<f64>) {
         vec![self.0.nrows()]
     }
 
-    fn part(&self, _: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>> {
+    fn part(&self, _: usize) -> Result<SamplePart<'_>, Box<dyn Error + Send + Sync>> {
         Ok((Cow::Borrowed(self.0), Cow::Borrowed(self.1)))
     }
 }
 
 /// Use of a number drawn from the seed of a training; each has draws of its own.
 #[derive(Clone, Copy)]
-pub(super) enum Purpose {
+pub(super) enum SeedUse {
     Weights,
     Split,
     Shuffle,
@@ -61,7 +61,7 @@ pub(super) enum Purpose {
 }
 
 /// Derives a seed for `purpose` and `counter`, which may be the epoch or the step.
-pub(super) fn derive(seed: u64, purpose: Purpose, counter: u64) -> u64 {
+pub(super) fn derive(seed: u64, purpose: SeedUse, counter: u64) -> u64 {
     // The seed is mixed, too, lest neighbouring seeds meet at neighbouring counters.
     mix(mix(mix(seed) ^ purpose as u64) ^ counter)
 }
@@ -114,10 +114,10 @@ pub(super) type Read<'a> = dyn Fn(usize) -> Result<Data, NetworkError> + 'a;
 pub(super) struct Feed<'a> {
     read: &'a Read<'a>,
     seed: u64,
-    rows: Rows,
+    rows: FeedRows,
 }
 
-enum Rows {
+enum FeedRows {
     InMemory {
         data: Data,
         training: Vec<usize>,
@@ -134,7 +134,7 @@ enum Rows {
 }
 
 /// Rows in memory, and the order in which they are used.
-pub(super) struct Block<'a> {
+pub(super) struct FeedBlock<'a> {
     pub data: Cow<'a, Data>,
     pub order: Vec<usize>,
 }
@@ -167,7 +167,7 @@ impl<'a> Feed<'a> {
                 features: data.features.select(Axis(0), &held_out),
                 targets: data.targets.select(Axis(0), &held_out),
             };
-            Rows::InMemory {
+            FeedRows::InMemory {
                 data,
                 training,
                 held_out,
@@ -178,7 +178,7 @@ impl<'a> Feed<'a> {
                 training -= 1;
                 held_out += sizes[training];
             }
-            Rows::Streamed {
+            FeedRows::Streamed {
                 sizes: sizes.to_vec(),
                 training,
                 most,
@@ -190,8 +190,8 @@ impl<'a> Feed<'a> {
     /// Rows that are trained on.
     pub fn rows(&self) -> usize {
         match &self.rows {
-            Rows::InMemory { training, .. } => training.len(),
-            Rows::Streamed {
+            FeedRows::InMemory { training, .. } => training.len(),
+            FeedRows::Streamed {
                 sizes, training, ..
             } => sizes[..*training].iter().sum(),
         }
@@ -200,8 +200,8 @@ impl<'a> Feed<'a> {
     /// The parts of each block of an epoch.
     pub fn blocks(&self, epoch: usize) -> Vec<Vec<usize>> {
         match &self.rows {
-            Rows::InMemory { .. } => vec![vec![]],
-            Rows::Streamed {
+            FeedRows::InMemory { .. } => vec![vec![]],
+            FeedRows::Streamed {
                 sizes,
                 training,
                 most,
@@ -219,17 +219,17 @@ impl<'a> Feed<'a> {
         parts: &[usize],
         block: usize,
         epoch: usize,
-    ) -> Result<Block<'_>, NetworkError> {
+    ) -> Result<FeedBlock<'_>, NetworkError> {
         let (data, mut order, number) = match &self.rows {
-            Rows::InMemory { data, training, .. } => (Cow::Borrowed(data), training.clone(), 0),
-            Rows::Streamed { .. } => {
+            FeedRows::InMemory { data, training, .. } => (Cow::Borrowed(data), training.clone(), 0),
+            FeedRows::Streamed { .. } => {
                 let data = together(self.read, parts.iter().copied())?;
                 let order = (0..data.targets.nrows()).collect();
                 (Cow::Owned(data), order, 1 + block)
             }
         };
         order.shuffle(&mut self.order(epoch, number));
-        Ok(Block { data, order })
+        Ok(FeedBlock { data, order })
     }
 
     /// The mean of `error` over the rows held out; `None` where there are none.
@@ -238,9 +238,9 @@ impl<'a> Feed<'a> {
         error: impl Fn(&Data) -> Result<f64, NetworkError>,
     ) -> Result<Option<f64>, NetworkError> {
         match &self.rows {
-            Rows::InMemory { held_out, .. } if held_out.targets.is_empty() => Ok(None),
-            Rows::InMemory { held_out, .. } => Ok(Some(error(held_out)?)),
-            Rows::Streamed {
+            FeedRows::InMemory { held_out, .. } if held_out.targets.is_empty() => Ok(None),
+            FeedRows::InMemory { held_out, .. } => Ok(Some(error(held_out)?)),
+            FeedRows::Streamed {
                 sizes,
                 training,
                 most,
@@ -261,10 +261,10 @@ impl<'a> Feed<'a> {
     /// The generator that orders the rows of a block, or (number 0) the parts or the only block of an epoch. An epoch depends
     /// on its number alone.
     fn order(&self, epoch: usize, number: usize) -> ChaCha8Rng {
-        let epoch = derive(self.seed, Purpose::Shuffle, epoch as u64);
+        let epoch = derive(self.seed, SeedUse::Shuffle, epoch as u64);
         ChaCha8Rng::seed_from_u64(match number {
             0 => epoch,
-            number => derive(epoch, Purpose::Shuffle, number as u64),
+            number => derive(epoch, SeedUse::Shuffle, number as u64),
         })
     }
 }
@@ -317,7 +317,7 @@ fn split(count: usize, share: f64, seed: u64) -> Result<(Vec<usize>, Vec<usize>)
         });
     }
     let mut training: Vec<usize> = (0..count).collect();
-    let order = derive(seed, Purpose::Split, 0);
+    let order = derive(seed, SeedUse::Split, 0);
     training.shuffle(&mut ChaCha8Rng::seed_from_u64(order));
     let held_out = training.split_off(count - held_out);
     // Each epoch orders them anew, from here.
@@ -377,7 +377,7 @@ mod tests {
         let read = |index: usize| Ok(part(&sizes, index));
         for (most, in_memory) in [(100, true), (8, false), (3, false)] {
             let feed = Feed::with_block(&sizes, most, &read, 0.2, 1).unwrap();
-            assert_eq!(matches!(feed.rows, Rows::InMemory { .. }), in_memory);
+            assert_eq!(matches!(feed.rows, FeedRows::InMemory { .. }), in_memory);
             let [first, second] = [0, 1].map(|e| epoch(&feed, e));
             assert_ne!(first, second);
             assert_eq!(

@@ -13,7 +13,7 @@
 //! Loops are compiled for the widest vectors of the processor. Sums run in sixteen lanes whatever that width is, so
 //! that it does not change their bits.
 
-use super::{Batch, TapedBatch};
+use super::{PlainBatch, TapedBatch};
 use crate::math::widest;
 use dfdx::nn::modules::{BuildOnDevice, ModuleVisitor, TensorCollection};
 use dfdx::nn::{Module, ModuleMut, ScalarOptions, TensorOptions};
@@ -198,13 +198,13 @@ macro_rules! fused_layer {
             }
         }
 
-        impl<const I: usize, const O: usize, A: Activation> Module<Batch<Const<I>>>
+        impl<const I: usize, const O: usize, A: Activation> Module<PlainBatch<Const<I>>>
             for $built<I, O, A, f32, Cpu>
         {
-            type Output = Batch<Const<O>>;
+            type Output = PlainBatch<Const<O>>;
             type Error = CpuError;
 
-            fn try_forward(&self, x: Batch<Const<I>>) -> Result<Self::Output, CpuError> {
+            fn try_forward(&self, x: PlainBatch<Const<I>>) -> Result<Self::Output, CpuError> {
                 self.layer().evaluate::<A>(x)
             }
         }
@@ -243,7 +243,10 @@ struct Layer<'a, const I: usize, const O: usize> {
 }
 
 impl<const I: usize, const O: usize> Layer<'_, I, O> {
-    fn evaluate<A: Activation>(&self, x: Batch<Const<I>>) -> Result<Batch<Const<O>>, CpuError> {
+    fn evaluate<A: Activation>(
+        &self,
+        x: PlainBatch<Const<I>>,
+    ) -> Result<PlainBatch<Const<O>>, CpuError> {
         let x = x.try_contiguous()?;
         let rows = x.shape().0;
         let (z, _) = self.compute::<A>(&numbers(&x), &numbers(self.weight), None);
@@ -256,7 +259,7 @@ impl<const I: usize, const O: usize> Layer<'_, I, O> {
     ) -> Result<TapedBatch<Const<O>>, CpuError> {
         let (x, mut tape) = x.try_contiguous()?.split_tape();
         let rows = x.shape().0;
-        let mask = (self.p > 0.0).then(|| Mask {
+        let mask = (self.p > 0.0).then(|| DropoutMask {
             probability: self.p,
             seed: x.device().random_u64(),
         });
@@ -291,7 +294,7 @@ impl<const I: usize, const O: usize> Layer<'_, I, O> {
         &self,
         x: &[f32],
         weight: &[f32],
-        mask: Option<Mask>,
+        mask: Option<DropoutMask>,
     ) -> (Vec<f32>, Saved) {
         let mut z = vec![0.0; x.len() / I * O];
         let (x, weight) = (view(x, I), view(weight, I));
@@ -344,7 +347,7 @@ fn forward<A: Activation>(
     z: &mut [f32],
     bias: &[f32],
     affine: Option<[&[f32]; 2]>,
-    mask: Option<Mask>,
+    mask: Option<DropoutMask>,
 ) -> Saved {
     let outputs = bias.len();
     let normed = if affine.is_some() { z.len() } else { 0 };
@@ -461,12 +464,12 @@ fn sum(x: &[f32], y: &[f32], term: impl Fn(f32, f32) -> f32) -> f32 {
 
 /// Drops each element with `probability`, as a pure function of `seed`, row and column.
 #[derive(Clone, Copy)]
-struct Mask {
+struct DropoutMask {
     probability: f32,
     seed: u64,
 }
 
-impl Mask {
+impl DropoutMask {
     #[inline(always)]
     fn apply(self, row: usize, out: &mut [f32], slope: &mut [f32]) {
         let threshold = (f64::from(self.probability) * 2f64.powi(32)) as u32;

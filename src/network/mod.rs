@@ -48,7 +48,7 @@ mod train;
 
 pub use architectures::{Compact, Deep};
 pub(crate) use checkpoints::Checkpoints;
-pub(crate) use data::{Part, Samples};
+pub(crate) use data::{SamplePart, Samples};
 pub use error::NetworkError;
 pub(crate) use fused::{BuiltDense, BuiltNormDense};
 pub use fused::{Dense, Leaky, NormDense};
@@ -76,7 +76,7 @@ pub mod untyped {
 }
 
 /// A batch of rows of width `C`.
-pub(crate) type Batch<C> = Tensor<(usize, C), f32, Cpu, NoneTape>;
+pub(crate) type PlainBatch<C> = Tensor<(usize, C), f32, Cpu, NoneTape>;
 
 /// A batch of rows of width `C` whose gradients are recorded.
 pub(crate) type TapedBatch<C> = Tensor<(usize, C), f32, Cpu, OwnedTape<f32, Cpu>>;

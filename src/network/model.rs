@@ -2,8 +2,8 @@
 
 use super::data::gathered;
 use super::{
-    Batch, BuiltDense, BuiltNormDense, HeadArchitecture, NamedTensor, NetworkError, TapedBatch,
-    tensors,
+    BuiltDense, BuiltNormDense, HeadArchitecture, NamedTensor, NetworkError, PlainBatch,
+    TapedBatch, tensors,
 };
 use dfdx::nn::modules::Linear;
 use dfdx::prelude::{
@@ -25,7 +25,7 @@ pub trait Layers<I: ConstDim, O: ConstDim>:
     + Clone
     + Send
     + Sync
-    + Module<Batch<I>, Output = Batch<O>, Error = CpuError>
+    + Module<PlainBatch<I>, Output = PlainBatch<O>, Error = CpuError>
     + ModuleMut<TapedBatch<I>, Output = TapedBatch<O>, Error = CpuError>
     + 'static
 {
@@ -36,7 +36,7 @@ impl<I: ConstDim, O: ConstDim, T> Layers<I, O> for T where
         + Clone
         + Send
         + Sync
-        + Module<Batch<I>, Output = Batch<O>, Error = CpuError>
+        + Module<PlainBatch<I>, Output = PlainBatch<O>, Error = CpuError>
         + ModuleMut<TapedBatch<I>, Output = TapedBatch<O>, Error = CpuError>
         + 'static
 {
@@ -89,27 +89,27 @@ weight_of_tuple!(B, C, D, E);
 weight_of_tuple!(B, C, D, E, F);
 
 /// Layers from `I` features to `K` hidden values, and one head for each output. With the trunk `()`, heads alone.
-pub(super) struct Model<I, K, T, H> {
+pub(super) struct MultiHeadModel<I, K, T, H> {
     pub(super) trunk: T,
     pub(super) heads: Vec<H>,
     widths: PhantomData<fn(I) -> K>,
 }
 
 /// The model of an architecture.
-pub(super) type ModelOf<A> = Model<
+pub(super) type ModelOf<A> = MultiHeadModel<
     <A as HeadArchitecture>::Features,
     <A as HeadArchitecture>::Hidden,
     <<A as HeadArchitecture>::Trunk as BuildOnDevice<Cpu, f32>>::Built,
     <<A as HeadArchitecture>::Head as BuildOnDevice<Cpu, f32>>::Built,
 >;
 
-impl<I, K, T: Clone, H: Clone> Clone for Model<I, K, T, H> {
+impl<I, K, T: Clone, H: Clone> Clone for MultiHeadModel<I, K, T, H> {
     fn clone(&self) -> Self {
         Self::new(self.trunk.clone(), self.heads.clone())
     }
 }
 
-impl<I, K, T, H> Model<I, K, T, H> {
+impl<I, K, T, H> MultiHeadModel<I, K, T, H> {
     pub(super) fn new(trunk: T, heads: Vec<H>) -> Self {
         Self {
             trunk,
@@ -135,10 +135,10 @@ pub(super) fn build<A: HeadArchitecture>(
         tensors::set_dropout(&mut head, A::DROPOUT)?;
         heads.push(head);
     }
-    Ok(Model::new(trunk, heads))
+    Ok(MultiHeadModel::new(trunk, heads))
 }
 
-impl<I, K, T, H> Model<I, K, T, H>
+impl<I, K, T, H> MultiHeadModel<I, K, T, H>
 where
     I: ConstDim,
     K: ConstDim,
@@ -153,9 +153,9 @@ where
         device: &Cpu,
     ) -> Result<Vec<TapedBatch<Const<1>>>, NetworkError> {
         let shape = (batch.len(), I::default());
-        let x: Batch<I> = device.try_tensor_from_vec(gathered(features, batch), shape)?;
+        let x: PlainBatch<I> = device.try_tensor_from_vec(gathered(features, batch), shape)?;
         let hidden = self.trunk.try_forward_mut(x.leaky_traced())?;
-        let bare: Batch<K> = hidden.retaped::<NoneTape>();
+        let bare: PlainBatch<K> = hidden.retaped::<NoneTape>();
         let mut hidden = Some(hidden);
         self.heads
             .iter_mut()
@@ -194,10 +194,10 @@ where
         Ok(predictions)
     }
 
-    fn through_trunk(&self, rows: ArrayView2<'_, f32>) -> Result<Batch<K>, NetworkError> {
+    fn through_trunk(&self, rows: ArrayView2<'_, f32>) -> Result<PlainBatch<K>, NetworkError> {
         let shape = (rows.nrows(), I::default());
         let values = rows.iter().copied().collect();
-        let x: Batch<I> = Cpu::default().try_tensor_from_vec(values, shape)?;
+        let x: PlainBatch<I> = Cpu::default().try_tensor_from_vec(values, shape)?;
         Ok(self.trunk.try_forward(x)?)
     }
 

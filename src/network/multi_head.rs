@@ -1,7 +1,7 @@
 //! Networks whose types are no longer known: the faces that the estimator sees, over the static types of an architecture.
 
-use super::data::{Data, Feed, Purpose, Samples, derive, padded};
-use super::model::{self, Model, ModelOf};
+use super::data::{Data, Feed, Samples, SeedUse, derive, padded};
+use super::model::{self, ModelOf, MultiHeadModel};
 use super::train::Course;
 use super::{Checkpoints, HeadArchitecture, History, NamedTensor, NetworkError, Training};
 use crate::progress::Progress;
@@ -112,7 +112,7 @@ impl<A: HeadArchitecture> Typed<A> {
                 return Err(NetworkError::Empty { what, least: 1 });
             }
         }
-        let seed = derive(seed, Purpose::Weights, 0);
+        let seed = derive(seed, SeedUse::Weights, 0);
         let model = model::build::<A>(inputs, outputs, seed)?;
         Ok(MultiHead { inputs, model })
     }
@@ -250,7 +250,7 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
         let feed = Feed::new(&[features.nrows()], width, &read, settings.holdout, seed)?;
         // Heads alone are a model too, with a trunk that does nothing.
         let heads = self.model.heads.clone();
-        let heads = Model::<A::Hidden, A::Hidden, (), _>::new((), heads);
+        let heads = MultiHeadModel::<A::Hidden, A::Hidden, (), _>::new((), heads);
         let course = Course {
             settings,
             seed,
@@ -262,7 +262,7 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
         let (heads, history) = heads.trained(&feed, &course)?;
         let tuned = Self {
             inputs: self.inputs,
-            model: Model::new(self.model.trunk.clone(), heads.heads),
+            model: MultiHeadModel::new(self.model.trunk.clone(), heads.heads),
         };
         Ok((Arc::new(tuned), history))
     }

@@ -1,10 +1,10 @@
 //! The training loop.
 
 use super::adam::Adam;
-use super::checkpoints::{Position, State};
-use super::data::{Block, Feed, Purpose, derive, gathered};
+use super::checkpoints::{Position, TrainingState};
+use super::data::{Feed, FeedBlock, SeedUse, derive, gathered};
 use super::loss::Loss;
-use super::model::{FirstWeight, Layers, Model};
+use super::model::{FirstWeight, Layers, MultiHeadModel};
 use super::{Checkpoints, History, NamedTensor, NetworkError, Training};
 use crate::progress::{Progress, Stage};
 use dfdx::prelude::{Backward, Const, ConstDim, Cpu};
@@ -30,7 +30,7 @@ struct Trainee<M> {
     best: Option<M>,
 }
 
-impl<I, K, T, H> Model<I, K, T, H>
+impl<I, K, T, H> MultiHeadModel<I, K, T, H>
 where
     I: ConstDim,
     K: ConstDim,
@@ -82,7 +82,7 @@ fn diverged(settings: &Training, epoch: usize) -> NetworkError {
     }
 }
 
-impl<I, K, T, H> Trainee<Model<I, K, T, H>>
+impl<I, K, T, H> Trainee<MultiHeadModel<I, K, T, H>>
 where
     I: ConstDim,
     K: ConstDim,
@@ -90,7 +90,7 @@ where
     H: Layers<K, Const<1>> + FirstWeight<K>,
 {
     /// Begins with what was kept, else anew.
-    fn begin(model: Model<I, K, T, H>, course: &Course<'_>) -> Self {
+    fn begin(model: MultiHeadModel<I, K, T, H>, course: &Course<'_>) -> Self {
         let decay = course.settings.weight_decay;
         let restored = |weights: &[NamedTensor]| {
             let mut restored = model.clone();
@@ -128,9 +128,10 @@ where
         let epoch = self.at.epoch;
         let parts = feed.blocks(epoch);
         while self.at.block < parts.len() {
-            let Block { data, order } = feed.block(&parts[self.at.block], self.at.block, epoch)?;
+            let FeedBlock { data, order } =
+                feed.block(&parts[self.at.block], self.at.block, epoch)?;
             for batch in order.chunks(settings.batch) {
-                let device = Cpu::seed_from_u64(derive(seed, Purpose::Dropout, self.at.step));
+                let device = Cpu::seed_from_u64(derive(seed, SeedUse::Dropout, self.at.step));
                 self.at.step += 1;
                 let predictions = (self.model).forward_taped(&data.features, batch, &device)?;
                 let targets = gathered(&data.targets, batch);
@@ -180,12 +181,14 @@ where
     /// Reports a block, and keeps the state if it is time to, or if the work is to stop.
     fn keep(&self, course: &Course<'_>, stage: &Stage) -> Result<(), NetworkError> {
         let stopped = stage.tick();
-        course.checkpoints.keep(stopped.is_err(), || State {
-            position: self.at.clone(),
-            weights: self.model.weights(),
-            best: self.best.as_ref().map_or(vec![], Model::weights),
-            adam: self.adam.clone(),
-        })?;
+        course
+            .checkpoints
+            .keep(stopped.is_err(), || TrainingState {
+                position: self.at.clone(),
+                weights: self.model.weights(),
+                best: self.best.as_ref().map_or(vec![], MultiHeadModel::weights),
+                adam: self.adam.clone(),
+            })?;
         Ok(stopped?)
     }
 }

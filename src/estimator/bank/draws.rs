@@ -101,7 +101,7 @@ impl Bank for Draws {
 
 /// One simulation of a set, or the draws so far that gave none.
 #[derive(Default)]
-struct Row {
+struct DrawnRow {
     theta: Vec<f64>,
     features: Option<Vec<f64>>,
     /// Draws that were out of bounds.
@@ -112,7 +112,7 @@ struct Row {
     reason: Option<String>,
 }
 
-impl Row {
+impl DrawnRow {
     fn check(&self) -> Result<(), EstimatorError> {
         if self.failed < ATTEMPTS && self.rejected < ATTEMPTS {
             return Ok(());
@@ -140,7 +140,7 @@ impl FeatureSimulator {
         stage: &Stage,
     ) -> Result<Draws, EstimatorError> {
         let numbers: Vec<u64> = rows.collect();
-        let rows: Vec<Row> = (numbers.par_chunks(self.at_once()))
+        let rows: Vec<DrawnRow> = (numbers.par_chunks(self.at_once()))
             .map(|numbers| {
                 let rows = self.some(numbers, &noise, &draw)?;
                 numbers.iter().try_for_each(|_| stage.tick())?;
@@ -160,7 +160,7 @@ impl FeatureSimulator {
                 reason: reason.unwrap_or_default(),
             });
         }
-        let stack = |of: &dyn Fn(&Row) -> &[f64], width: usize| {
+        let stack = |of: &dyn Fn(&DrawnRow) -> &[f64], width: usize| {
             let mut all = Array2::zeros((size, width));
             for (mut to, row) in all.rows_mut().into_iter().zip(&rows) {
                 to.assign(&ndarray::ArrayView1::from(of(row)));
@@ -180,8 +180,8 @@ impl FeatureSimulator {
         numbers: &[u64],
         noise: &impl Fn(u64) -> Noise,
         draw: &impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, EstimatorError>,
-    ) -> Result<Vec<Row>, EstimatorError> {
-        let mut rows: Vec<Row> = numbers.iter().map(|_| Row::default()).collect();
+    ) -> Result<Vec<DrawnRow>, EstimatorError> {
+        let mut rows: Vec<DrawnRow> = numbers.iter().map(|_| DrawnRow::default()).collect();
         while rows.iter().any(|row| row.features.is_none()) {
             let mut drawn: Vec<(usize, Draw<'a>, Noise)> = vec![];
             for (k, row) in rows.iter_mut().enumerate() {

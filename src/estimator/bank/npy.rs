@@ -41,11 +41,11 @@ pub(super) fn write(matrix: &Array2<f64>, to: &mut impl Write) -> io::Result<()>
 /// Reads a matrix of 64-bit or 32-bit numbers from `size` bytes.
 pub(super) fn read(from: &mut impl Read, size: u64) -> Result<Array2<f64>, String> {
     let (text, rest) = header_text(from, size)?;
-    let Header {
+    let ArrayHeader {
         shape,
         width,
         number,
-    } = Header::parse(&text, rest)?;
+    } = ArrayHeader::parse(&text, rest)?;
     let mut bytes = Vec::new();
     let unread = |error: &dyn std::fmt::Display| format!("its numbers cannot be read: {error}");
     (from.take(rest).read_to_end(&mut bytes)).map_err(|error| unread(&error))?;
@@ -77,7 +77,7 @@ fn header_text(from: &mut impl Read, size: u64) -> Result<(String, u64), String>
     Ok((text, size - (start.len() + width + length) as u64))
 }
 
-struct Header {
+struct ArrayHeader {
     shape: Shape<Ix2>,
     /// Bytes of a number.
     width: usize,
@@ -85,7 +85,7 @@ struct Header {
     number: fn(&[u8]) -> f64,
 }
 
-impl Header {
+impl ArrayHeader {
     /// Parses the header of a matrix that has `rest` bytes.
     fn parse(text: &str, rest: u64) -> Result<Self, String> {
         let no_matrix = || format!("its header \"{}\" describes no matrix", text.trim());

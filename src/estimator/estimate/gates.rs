@@ -1,13 +1,13 @@
 //! The tests of an estimate: at the network's, and at the refitted one. An answer near its level is taken again from more simulations.
 
-use super::Run;
+use super::EstimateRun;
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::gate::{GateForm, GateOutcome, GateSettings, GateTest};
-use crate::estimator::refine::Refined;
+use crate::estimator::refine::RefinedEstimate;
 use nalgebra::DVector;
 
-impl Run<'_> {
+impl EstimateRun<'_> {
     /// The simulator in noise drawn from the record's fit, where there is one.
     fn in_drawn_noise(
         &self,
@@ -81,7 +81,7 @@ impl Run<'_> {
         &self,
         simulator: &FeatureSimulator,
         theta: &[f64],
-        refined: &Refined,
+        refined: &RefinedEstimate,
         observed: &DVector<f64>,
     ) -> Result<Option<GateOutcome>, EstimatorError> {
         let simulator = self.in_drawn_noise(simulator)?;

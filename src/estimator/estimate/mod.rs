@@ -16,7 +16,7 @@ mod tune;
 mod warnings;
 
 pub use outcome::{Estimate, EstimateOptions, PointEstimate, Refit};
-pub(crate) use outcome::{Kept, Stages};
+pub(crate) use outcome::{KeptEstimate, Stages};
 pub use together::Together;
 pub use tracking::Tracking;
 pub(crate) use tune::Contributions;
@@ -26,7 +26,7 @@ use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
 use crate::estimator::recipe::Steps;
-use crate::estimator::refine::{Information, RefineSettings, Refinement};
+use crate::estimator::refine::{FeatureInformation, RefineSettings, Refinement};
 use crate::estimator::settings::Settings;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -89,7 +89,7 @@ impl Estimator {
             Some(fit) => declared.of(&fit.twin, None)?,
             None => declared,
         };
-        let run = Run {
+        let run = EstimateRun {
             estimator: self,
             settings,
             record,
@@ -108,7 +108,7 @@ impl Estimator {
         let (stages, tracking) = if is_kept {
             let information = run.information(&simulator, &initial.theta)?;
             (
-                Stages::Kept(Kept { information }),
+                Stages::Kept(KeptEstimate { information }),
                 follow(&initial.theta, record),
             )
         } else {
@@ -183,7 +183,7 @@ impl Estimator {
 }
 
 /// One estimate under way.
-struct Run<'a> {
+struct EstimateRun<'a> {
     estimator: &'a Estimator,
     settings: &'a Settings,
     record: &'a Record,
@@ -195,7 +195,7 @@ struct Run<'a> {
     progress: &'a Progress,
 }
 
-impl Run<'_> {
+impl EstimateRun<'_> {
     fn refinement<'a>(
         &'a self,
         simulator: &'a FeatureSimulator,
@@ -218,7 +218,7 @@ impl Run<'_> {
         &self,
         simulator: &FeatureSimulator,
         theta: &[f64],
-    ) -> Result<Option<Information>, EstimatorError> {
+    ) -> Result<Option<FeatureInformation>, EstimatorError> {
         let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
         match refinement.describe_at(theta) {
             Ok(refined) => Ok(Some(refined.information)),

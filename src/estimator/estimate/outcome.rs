@@ -6,7 +6,7 @@ use crate::estimator::bank::Draws;
 use crate::estimator::gate::GateOutcome;
 use crate::estimator::readout::Spread;
 use crate::estimator::recipe::PresetName;
-use crate::estimator::refine::Information;
+use crate::estimator::refine::FeatureInformation;
 use crate::fit::doubts::{DIVERGES, NO_BETTER};
 use crate::fit::{FittedNoise, Nuisance, Posterior, Warning};
 use crate::record::Record;
@@ -61,16 +61,16 @@ impl PointEstimate {
 #[derive(Debug, Clone)]
 pub(crate) enum Stages {
     /// The prior is trusted and the gate agrees: the network's estimate is the answer.
-    Kept(Kept),
+    Kept(KeptEstimate),
     /// The record was refitted.
     Refitted(Box<Refit>),
 }
 
 /// Description of the record's information at the network's estimate.
 #[derive(Debug, Clone)]
-pub(crate) struct Kept {
+pub(crate) struct KeptEstimate {
     /// Information and directions; `None` where the features do not tell them.
-    pub(crate) information: Option<Information>,
+    pub(crate) information: Option<FeatureInformation>,
 }
 
 /// Refit of a record: Gauss–Newton, cloud, tuned heads, the test again.
@@ -89,7 +89,7 @@ pub struct Refit {
     /// Contributions of layer and heads to it; `None` without a quadratic layer.
     pub(crate) contributions: Option<Contributions>,
     /// Information and directions at Gauss–Newton's estimate.
-    pub(crate) information: Information,
+    pub(crate) information: FeatureInformation,
     /// The test of the answer; `None` where no degree of freedom is left.
     pub after: Option<GateOutcome>,
     /// The free run at the network's estimate, for comparison; `None` where it diverges.
@@ -179,7 +179,7 @@ impl Estimate {
     }
 
     /// Information and directions at Gauss–Newton's estimate, or at the network's where the gate kept it.
-    pub(crate) fn information(&self) -> Option<&Information> {
+    pub(crate) fn information(&self) -> Option<&FeatureInformation> {
         match &self.stages {
             Stages::Kept(kept) => kept.information.as_ref(),
             Stages::Refitted(refit) => Some(&refit.information),

@@ -1,13 +1,13 @@
 //! The refit of a record: Gauss–Newton, cloud, tuned heads, gate again.
 
-use super::Run;
+use super::EstimateRun;
 use super::outcome::{PointEstimate, Refit, RefitSeconds};
 use super::tune::{Tuning, tune};
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::cloud::Cloud;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
-use crate::estimator::refine::{Refined, Refinement};
+use crate::estimator::refine::{RefinedEstimate, Refinement};
 use crate::fit::posterior::PosteriorRegion;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
@@ -15,7 +15,7 @@ use std::time::Instant;
 /// The tuned estimate is kept within this quantile of χ²_d: of its squared distance from the record's posterior, or of its whitened misfit.
 const KEEP_TUNED: f64 = 0.999;
 
-impl Run<'_> {
+impl EstimateRun<'_> {
     /// Refits from the network's estimate; where the record's fit has a `region` and the features have a reference, about its mean.
     pub(super) fn refit(
         &self,
@@ -103,7 +103,7 @@ impl Run<'_> {
 
 /// Returns whether the tuned estimate stays within the misfit that θ could still explain by chance: the part of its whitened
 /// residual in the Jacobian's column space against χ²_d(0.999).
-fn keeps(refinement: &Refinement<'_>, refined: &Refined, theta: &[f64]) -> bool {
+fn keeps(refinement: &Refinement<'_>, refined: &RefinedEstimate, theta: &[f64]) -> bool {
     (refinement.whitened_residual(refined, theta))
         .map(|residual| refined.explainable_misfit(&residual))
         .is_ok_and(|misfit| is_likely(misfit, theta.len()))

@@ -6,7 +6,7 @@ use crate::estimator::estimator::Estimator;
 use crate::estimator::readout::{
     Calibration, INTERVAL_LEVEL, QuadraticLayer, Readout, Scaler, Spread, Standardiser,
 };
-use crate::estimator::refine::Refined;
+use crate::estimator::refine::RefinedEstimate;
 use crate::estimator::settings::Settings;
 use crate::math::one_row;
 use crate::network::Training;
@@ -39,7 +39,7 @@ pub struct Tuning<'a> {
     /// The cloud.
     pub draws: &'a Draws,
     /// Gauss–Newton's estimate, whose information weighs the targets.
-    pub refined: &'a Refined,
+    pub refined: &'a RefinedEstimate,
     /// The record's features.
     pub observed: &'a DVector<f64>,
     /// Settings of the estimate.
@@ -164,7 +164,7 @@ fn explained(predicted: &Array2<f64>, truth: &Array2<f64>) -> Vec<f64> {
 }
 
 /// w_j for standardised targets.
-fn weights(refined: &Refined, targets: &Scaler) -> Vec<f64> {
+fn weights(refined: &RefinedEstimate, targets: &Scaler) -> Vec<f64> {
     let information: Vec<f64> = (targets.scale.iter().enumerate())
         .map(|(j, scale)| refined.information.matrix[(j, j)] * scale * scale)
         .collect();

@@ -1,6 +1,6 @@
 //! A pretraining that can be interrupted.
 
-use super::train::{Plan, PretrainOptions};
+use super::train::{PretrainOptions, PretrainPlan};
 use crate::estimator::bank::Bank;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
@@ -110,7 +110,7 @@ impl<'a> Pretraining<'a> {
     ) -> Result<(Estimator, History), EstimatorError> {
         let checkpoints = Checkpoints::new(folder.file(TRAINING), self.every);
         // What the network cannot take is said before anything is simulated.
-        let plan = Plan::new(&self.project, self.sized())?;
+        let plan = PretrainPlan::new(&self.project, self.sized())?;
         let simulated;
         let bank = match &self.bank {
             Some(given) => given.bank,
@@ -143,7 +143,7 @@ impl<'a> Pretraining<'a> {
     /// Everything that the estimator depends on.
     fn manifest(&self) -> Result<Manifest, EstimatorError> {
         let preset = self.project.recipe(self.options.preset);
-        let settings = Plan::new(&self.project, self.sized())?.settings;
+        let settings = PretrainPlan::new(&self.project, self.sized())?.settings;
         let bank = match &self.bank {
             Some(given) => given.checksum.clone(),
             None => "simulated".into(),

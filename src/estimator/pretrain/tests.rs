@@ -1,6 +1,6 @@
 //! Training on a bank on disk.
 
-use super::train::Plan;
+use super::train::PretrainPlan;
 use super::{PretrainOptions, pretrain};
 use crate::estimator::bank::{Bank, Draws};
 use crate::estimator::shards::ShardedBank;
@@ -22,7 +22,11 @@ fn pretrain_on(
         bank_size: Some(bank.rows()),
         ..*options
     };
-    Plan::new(&study.into(), options)?.train(bank, &Checkpoints::none(), &Progress::silent())
+    PretrainPlan::new(&study.into(), options)?.train(
+        bank,
+        &Checkpoints::none(),
+        &Progress::silent(),
+    )
 }
 
 fn options(size: usize) -> PretrainOptions {

@@ -7,7 +7,7 @@ use crate::estimator::project::Project;
 use crate::estimator::readout::{Calibration, Readout, Scaler, Standardiser};
 use crate::estimator::recipe::PresetName;
 use crate::estimator::settings::{Inputs, Settings};
-use crate::network::{Checkpoints, History, Part, Samples};
+use crate::network::{Checkpoints, History, SamplePart, Samples};
 use crate::progress::Progress;
 use ndarray::Array2;
 use std::borrow::Cow;
@@ -51,7 +51,7 @@ pub fn pretrain(
     progress: &Progress,
 ) -> Result<(Estimator, History), EstimatorError> {
     let project = &project.into();
-    let plan = Plan::new(project, *options)?;
+    let plan = PretrainPlan::new(project, *options)?;
     let size = plan.size_in_memory()?;
     let stage = progress.stage("bank", size);
     let bank = (plan.prior).rows(0..size as u64, options.seed, "bank", &stage)?;
@@ -59,7 +59,7 @@ pub fn pretrain(
 }
 
 /// A pretraining whose settings are checked and whose features the network takes.
-pub(super) struct Plan<'a> {
+pub(super) struct PretrainPlan<'a> {
     project: &'a Project,
     options: PretrainOptions,
     /// The preset's numbers with those that the options replace.
@@ -68,7 +68,7 @@ pub(super) struct Plan<'a> {
     prior: Prior,
 }
 
-impl<'a> Plan<'a> {
+impl<'a> PretrainPlan<'a> {
     pub fn new(project: &'a Project, options: PretrainOptions) -> Result<Self, EstimatorError> {
         let recipe = project.recipe(options.preset);
         let mut settings = recipe.settings.clone();
@@ -213,7 +213,7 @@ impl Samples for Standardised<'_> {
         self.bank.parts()
     }
 
-    fn part(&self, index: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>> {
+    fn part(&self, index: usize) -> Result<SamplePart<'_>, Box<dyn Error + Send + Sync>> {
         let draws = self.bank.part(index)?;
         let features = self.inputs.apply(&draws.features);
         let targets = self.targets.apply(&draws.theta);

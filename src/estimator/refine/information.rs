@@ -12,7 +12,7 @@ use serde::Serialize;
 /// Source: Lakshminarayanan, Guerrero & Rojas, section IV-B.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
-pub struct Information {
+pub struct FeatureInformation {
     /// G, d × d, inverse squared parameter units.
     pub matrix: DMatrix<f64>,
     /// G⁻¹.
@@ -37,7 +37,7 @@ pub struct Direction {
     pub weak: bool,
 }
 
-impl Information {
+impl FeatureInformation {
     /// From the whitened Jacobian (rank × d, inverse parameter units), λ and K.
     pub fn new(
         jacobian: &DMatrix<f64>,
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn the_unseen_direction_is_weak_and_named() {
-        let found = Information::new(&jacobian(1.0), &space(1.0), 0.01, 1).unwrap();
+        let found = FeatureInformation::new(&jacobian(1.0), &space(1.0), 0.01, 1).unwrap();
         let weak: Vec<_> = found.weak().collect();
         assert_eq!(weak.len(), 1);
         assert_eq!(weak[0].combination, "0.71·a − 0.71·b");
@@ -145,8 +145,8 @@ mod tests {
     #[test]
     fn units_do_not_matter() {
         let (one, tiny) = (1.0, 1e-9);
-        let a = Information::new(&jacobian(one), &space(one), 0.01, 3).unwrap();
-        let b = Information::new(&jacobian(tiny), &space(tiny), 0.01, 3).unwrap();
+        let a = FeatureInformation::new(&jacobian(one), &space(one), 0.01, 3).unwrap();
+        let b = FeatureInformation::new(&jacobian(tiny), &space(tiny), 0.01, 3).unwrap();
         assert!((a.std_error[0] * tiny / b.std_error[0] - 1.0).abs() < 1e-9);
         assert!((a.directions[0].std_error - b.directions[0].std_error).abs() < 1e-9);
     }
@@ -156,7 +156,8 @@ mod tests {
     fn starts_alone_have_no_directions() {
         let start = Parameter::new("start.x", "", 0.0, 1.0).with_role(Role::Start);
         let space = ParameterSpace::new([start]);
-        let information = Information::new(&DMatrix::from_element(1, 1, 5.0), &space, 0.01, 1);
+        let information =
+            FeatureInformation::new(&DMatrix::from_element(1, 1, 5.0), &space, 0.01, 1);
         let information = information.unwrap();
         assert_eq!(information.directions, []);
         assert!((information.std_error[0] - (12.51f64).powf(-0.5)).abs() < 1e-12);
@@ -164,7 +165,7 @@ mod tests {
 
     #[test]
     fn no_information_is_an_error_that_names_the_direction() {
-        let error = Information::new(&jacobian(1.0), &space(1.0), 0.0, 1).unwrap_err();
+        let error = FeatureInformation::new(&jacobian(1.0), &space(1.0), 0.0, 1).unwrap_err();
         assert!(error.to_string().contains("0.71·a − 0.71·b"), "{error}");
     }
 }

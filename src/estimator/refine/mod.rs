@@ -19,7 +19,7 @@ mod tests;
 
 #[cfg(test)]
 pub(crate) use information::Direction;
-pub(crate) use information::Information;
+pub(crate) use information::FeatureInformation;
 pub use settings::RefineSettings;
 
 use crate::estimator::bank::FeatureSimulator;
@@ -39,7 +39,7 @@ const AT_REST: f64 = 1e-3;
 /// The refined estimate, with what was simulated around it.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
-pub struct Refined {
+pub struct RefinedEstimate {
     /// θ_GN.
     pub theta: DVector<f64>,
     /// μ and S^{-1/2} at θ_GN; after a single round, where it began.
@@ -51,10 +51,10 @@ pub struct Refined {
     /// S^{-1/2}(f̄ − x_obs) at θ_GN.
     pub residual: DVector<f64>,
     /// G and what follows from it.
-    pub information: Information,
+    pub information: FeatureInformation,
 }
 
-impl Refined {
+impl RefinedEstimate {
     /// S^{-1/2} ∂f̄/∂θ, rank × d.
     pub fn whitened_jacobian(&self) -> DMatrix<f64> {
         self.whitening.apply_columns(&self.jacobian)
@@ -97,7 +97,7 @@ pub struct Refinement<'a> {
 debug_by_name!(Refinement<'_>);
 
 /// Where one start has come to.
-struct Candidate {
+struct StartEnd {
     theta: DVector<f64>,
     local: Local,
     score: f64,
@@ -112,7 +112,7 @@ struct Local {
 
 impl Refinement<'_> {
     /// Runs it from `initial`.
-    pub fn run(&self, initial: &[f64]) -> Result<Refined, EstimatorError> {
+    pub fn run(&self, initial: &[f64]) -> Result<RefinedEstimate, EstimatorError> {
         let settings = self.settings;
         let steps = settings.starts + settings.rounds;
         let stage = self.progress.stage("Gauss–Newton", steps);
@@ -129,7 +129,7 @@ impl Refinement<'_> {
     }
 
     /// Returns information and directions at `theta` without a search.
-    pub fn describe_at(&self, theta: &[f64]) -> Result<Refined, EstimatorError> {
+    pub fn describe_at(&self, theta: &[f64]) -> Result<RefinedEstimate, EstimatorError> {
         let problem = self.problem(theta, self.settings.seeds);
         let theta = problem.initial.clone();
         let local = self.whiten(&theta)?;
@@ -139,7 +139,7 @@ impl Refinement<'_> {
     /// S^{-1/2}(f̄(θ) − x_obs) with the covariance at θ_GN.
     pub fn whitened_residual(
         &self,
-        refined: &Refined,
+        refined: &RefinedEstimate,
         theta: &[f64],
     ) -> Result<DVector<f64>, EstimatorError> {
         let problem = self.problem(refined.theta.as_slice(), self.settings.seeds);
@@ -178,7 +178,7 @@ impl Refinement<'_> {
     ) -> Result<(DVector<f64>, Local), EstimatorError> {
         let mut problem = self.problem(initial.as_slice(), self.settings.survey_seeds);
         let others = space_filling(&problem.bounds()?, self.settings.starts - 1, 0);
-        let (mut best, mut last): (Option<Candidate>, _) = (None, String::new());
+        let (mut best, mut last): (Option<StartEnd>, _) = (None, String::new());
         for start in [initial.clone()].into_iter().chain(others) {
             match self.climb(&mut problem, &start) {
                 // Ties and equals go to the earlier start: θ_init comes first.
@@ -192,7 +192,7 @@ impl Refinement<'_> {
             stage.tick()?;
         }
         let starts = self.settings.starts;
-        let Candidate { theta, local, .. } = best.ok_or_else(|| {
+        let StartEnd { theta, local, .. } = best.ok_or_else(|| {
             EstimatorError::Undetermined(format!(
                 "Gauss–Newton found no estimate from {starts} starts: {last}; widen the bounds or check the twin"
             ))
@@ -205,13 +205,13 @@ impl Refinement<'_> {
         &self,
         problem: &mut FeatureResidual<'_>,
         start: &DVector<f64>,
-    ) -> Result<Candidate, EstimatorError> {
+    ) -> Result<StartEnd, EstimatorError> {
         problem.whitening = Some(self.whiten(start)?.whitening);
         let theta = self.descend(problem, start)?;
         let local = self.whiten(&theta)?;
         problem.whitening = Some(local.whitening.clone());
         let residual = problem.residual(&theta).map_err(not_evaluated)?;
-        Ok(Candidate {
+        Ok(StartEnd {
             score: -0.5 * (residual.norm_squared() + local.whitening.log_determinant()),
             theta,
             local,
@@ -280,17 +280,17 @@ impl Refinement<'_> {
         problem: &FeatureResidual<'_>,
         theta: DVector<f64>,
         Local { whitening, spread }: Local,
-    ) -> Result<Refined, EstimatorError> {
+    ) -> Result<RefinedEstimate, EstimatorError> {
         let jacobian = problem.feature_jacobian(&theta).map_err(not_evaluated)?;
         let mean = problem.mean_features(&theta).map_err(not_evaluated)?;
         let residual = whitening.apply(&(mean - self.observed));
-        let information = Information::new(
+        let information = FeatureInformation::new(
             &whitening.apply_columns(&jacobian),
             &self.simulator.twin().parameters(),
             self.settings.ridge,
             self.settings.seeds,
         )?;
-        Ok(Refined {
+        Ok(RefinedEstimate {
             theta,
             whitening,
             spread,

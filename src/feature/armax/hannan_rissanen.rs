@@ -60,14 +60,18 @@ impl Orders {
 
 /// An ARMAX model: a₁ … a_p, b₁₁ … , c₁ … c_r, and the standard deviation of its innovations.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Model {
+pub(super) struct ArmaxModel {
     pub coefficients: Vec<f64>,
     pub innovation: f64,
 }
 
 /// Estimates the model of `y` with `inputs`, of [`Orders::needed`] samples at least.
-pub(super) fn estimate(y: &[f64], inputs: &[Vec<f64>], orders: Orders) -> Result<Model, MathError> {
-    let series = Series::new(y, inputs, orders);
+pub(super) fn estimate(
+    y: &[f64],
+    inputs: &[Vec<f64>],
+    orders: Orders,
+) -> Result<ArmaxModel, MathError> {
+    let series = ArmaxSeries::new(y, inputs, orders);
     let mut theta = series.by_regressions()?;
     let mut residuals = series.residuals(&theta);
     for _ in 0..PASSES {
@@ -87,14 +91,14 @@ pub(super) fn estimate(y: &[f64], inputs: &[Vec<f64>], orders: Orders) -> Result
     }
     let rows = (y.len() - orders.start()) as f64;
     let floor = ROUNDING * (sum_of_squares(y) / y.len() as f64).sqrt();
-    Ok(Model {
+    Ok(ArmaxModel {
         coefficients: theta,
         innovation: (sum_of_squares(&residuals) / rows).sqrt().max(floor),
     })
 }
 
 /// Signals that a model is fitted to.
-struct Series<'a> {
+struct ArmaxSeries<'a> {
     y: &'a [f64],
     inputs: &'a [Vec<f64>],
     orders: Orders,
@@ -102,7 +106,7 @@ struct Series<'a> {
     past: LaggedSignals,
 }
 
-impl<'a> Series<'a> {
+impl<'a> ArmaxSeries<'a> {
     fn new(y: &'a [f64], inputs: &'a [Vec<f64>], orders: Orders) -> Self {
         let past = LaggedSignals::new(lagged(y, orders.p, inputs, orders.q), orders.start());
         Self {
@@ -272,7 +276,7 @@ mod tests {
             .collect();
         let n = f64::from(records);
         for (i, truth) in truth.into_iter().enumerate() {
-            let of = |model: &Model| model.coefficients[i] - truth;
+            let of = |model: &ArmaxModel| model.coefficients[i] - truth;
             let mean = found.iter().map(|(m, _)| of(m)).sum::<f64>() / n;
             let variance = found
                 .iter()
@@ -301,7 +305,7 @@ mod tests {
         for seed in 0..60 {
             let (y, u) = record(300, seed);
             let inputs = [u];
-            let series = Series::new(&y, &inputs, orders(2));
+            let series = ArmaxSeries::new(&y, &inputs, orders(2));
             let error = |c: &[f64]| (c[4] - C[0]).powi(2) + (c[5] - C[1]).powi(2);
             before += error(&series.by_regressions().unwrap());
             after += error(&estimate(&y, &inputs, orders(2)).unwrap().coefficients);

@@ -5,7 +5,7 @@ mod hannan_rissanen;
 use super::{FeatureError, FeatureMap, FeatureRecipe, check_long, check_varies};
 use crate::record::{Drive, Signal};
 use crate::twin::Twin;
-use hannan_rissanen::{Model, Orders, estimate};
+use hannan_rissanen::{ArmaxModel, Orders, estimate};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -90,7 +90,7 @@ impl FeatureMap for ArmaxMap {
             .collect();
         let mut features = Vec::with_capacity(self.dim());
         for y in outputs.columns() {
-            let Model {
+            let ArmaxModel {
                 coefficients,
                 innovation,
             } = estimate(&y.to_vec(), &inputs, self.orders)?;

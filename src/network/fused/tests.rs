@@ -23,19 +23,19 @@ fn close(what: &str, ours: &[f32], plain: &[f32]) {
     }
 }
 
-fn input(device: &Cpu) -> Batch<Const<21>> {
+fn input(device: &Cpu) -> PlainBatch<Const<21>> {
     device.sample_normal_like(&(ROWS, Const::<21>))
 }
 
 /// Output, and gradients of input, weight and bias, of a loss with a different slope for each output.
-fn run<L>(layers: &mut L, x: &Batch<Const<21>>) -> (Vec<f32>, Gradients<f32, Cpu>)
+fn run<L>(layers: &mut L, x: &PlainBatch<Const<21>>) -> (Vec<f32>, Gradients<f32, Cpu>)
 where
     L: ModuleMut<TapedBatch<Const<21>>, Output = TapedBatch<Const<18>>, Error = CpuError>,
 {
     let out = layers.forward_mut(x.leaky_trace());
     let values = out.retaped::<NoneTape>().as_vec();
     let slopes = (0..ROWS * 18).map(|i| (i % 5) as f32 - 1.5).collect();
-    let slopes: Batch<Const<18>> = x.device().tensor_from_vec(slopes, (ROWS, Const));
+    let slopes: PlainBatch<Const<18>> = x.device().tensor_from_vec(slopes, (ROWS, Const));
     (values, (out * slopes).sum().backward())
 }
 
@@ -124,14 +124,14 @@ fn an_input_that_is_not_contiguous_is_read_in_its_order() {
     let fused = device.build_module::<Dense<21, 18, Tanh>, f32>();
     let turned: Tensor<(Const<21>, usize), f32, Cpu> =
         device.sample_normal_like(&(Const::<21>, ROWS));
-    let view: Batch<Const<21>> = turned.permute();
-    let copy: Batch<Const<21>> = device.tensor_from_vec(view.as_vec(), (ROWS, Const));
+    let view: PlainBatch<Const<21>> = turned.permute();
+    let copy: PlainBatch<Const<21>> = device.tensor_from_vec(view.as_vec(), (ROWS, Const));
     assert_eq!(fused.forward(view).as_vec(), fused.forward(copy).as_vec());
 }
 
 fn dropped(rows: usize, outputs: usize, probability: f32, seed: u64) -> Vec<f32> {
     let mut z = vec![1.0; rows * outputs];
-    let mask = Mask { probability, seed };
+    let mask = DropoutMask { probability, seed };
     forward::<ReLU>(&mut z, &vec![0.0; outputs], None, Some(mask));
     z
 }
