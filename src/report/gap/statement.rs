@@ -17,7 +17,7 @@ pub(super) const SAID: f64 = 0.5;
 /// Probability that nothing is missing below which *no gap* is said with a reservation.
 const CLEAR: f64 = 0.9;
 /// Words of the answer: with heading and caption there are at most 60 on the first screen.
-const WORDS: usize = 44;
+const WORDS: usize = 46;
 const APART: &str = "this record cannot tell which";
 
 /// The effects of an answer by how sure they are.
@@ -390,7 +390,7 @@ pub(super) fn next(diagnosis: &Diagnosis) -> String {
     let names = Names::of(cause);
     let add = |then: &str| {
         let names = names.keys().join(" and ");
-        format!("add {names} to the study, with the magnitudes found, and {then}")
+        format!("add {names} to the study with the magnitudes found, {then}")
     };
     let advice = match (diagnosis.verdict, cause.decision) {
         _ if diagnosis.interrupted => "run the diagnosis again, to its end".into(),
