@@ -1,24 +1,12 @@
 //! Two Kalman filters side by side: one for the states, one for θ.
 
+use super::numbers::BASELINE;
 use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::FilterError;
 use crate::math::Stencil;
 use crate::record::{Drive, Record};
 use crate::twin::{Acting, Interval, Now, ParameterSpace, StateSpace, Workspace};
 use nalgebra::{DMatrix, DVector};
-
-/// Variance of each state at the first row.
-const STATE_VARIANCE: f64 = 1e-2;
-/// Variance of each parameter at the first row.
-const PARAMETER_VARIANCE: f64 = 0.1;
-/// Variance added to each state a step.
-const STATE_WALK: f64 = 1e-5;
-/// Variance added to each parameter a step.
-const PARAMETER_WALK: f64 = 1e-7;
-/// Standard deviation of the measurement.
-const MEASUREMENT: f64 = 0.02;
-/// Step of differences, relative to the scale of what is varied.
-const DIFFERENCE: f64 = 1e-5;
 
 /// Tracks θ along a record from `start`, brought into the bounds, and returns θ after the last row.
 ///
@@ -58,10 +46,10 @@ pub fn dual_filter(
     let mut x = vec![record.outputs()[[0, 0]]; n];
     step.hold(&mut x);
     let mut x = DVector::from_vec(x);
-    let mut spread = DMatrix::identity(n, n) * STATE_VARIANCE;
-    let mut belief = DMatrix::identity(d, d) * PARAMETER_VARIANCE;
+    let mut spread = DMatrix::identity(n, n) * BASELINE.state_variance;
+    let mut belief = DMatrix::identity(d, d) * BASELINE.parameter_variance;
     let mut sensitivity = DMatrix::zeros(n, d);
-    let noise = DMatrix::identity(p, p) * (MEASUREMENT * MEASUREMENT);
+    let noise = DMatrix::identity(p, p) * (BASELINE.measurement * BASELINE.measurement);
     for k in 0..record.samples() {
         let acting = Acting::of(twin, &theta, drive)?;
         let now = acting.at(k, &theta);
@@ -101,10 +89,10 @@ pub fn dual_filter(
         step.hold(x.as_mut_slice());
         spread = symmetric(&motion * spread * motion.transpose());
         for i in 0..n {
-            spread[(i, i)] += STATE_WALK;
+            spread[(i, i)] += BASELINE.state_walk;
         }
         for j in 0..d {
-            belief[(j, j)] += PARAMETER_WALK;
+            belief[(j, j)] += BASELINE.parameter_walk;
         }
     }
     Ok(theta)
@@ -142,7 +130,11 @@ impl<'a> TwinStep<'a> {
             twin,
             limits: twin.limits(),
             p,
-            steps: space.widths().iter().map(|w| DIFFERENCE * w).collect(),
+            steps: space
+                .widths()
+                .iter()
+                .map(|w| BASELINE.difference * w)
+                .collect(),
             lower: space.bounds().iter().map(|b| b.low()).collect(),
             upper: space.bounds().iter().map(|b| b.high()).collect(),
             work: Workspace::new(twin),
@@ -170,7 +162,10 @@ impl<'a> TwinStep<'a> {
     }
 
     fn around(x: &[f64]) -> Result<Stencil, EvaluateError> {
-        let steps: Vec<f64> = x.iter().map(|v| DIFFERENCE * v.abs().max(1e-2)).collect();
+        let steps: Vec<f64> = x
+            .iter()
+            .map(|v| BASELINE.difference * v.abs().max(1e-2))
+            .collect();
         let free = vec![f64::INFINITY; x.len()];
         let below = vec![f64::NEG_INFINITY; x.len()];
         Ok(Stencil::new(x, &steps, &below, &free)?)

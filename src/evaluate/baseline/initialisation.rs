@@ -1,10 +1,8 @@
 //! Where a baseline starts.
 
+use super::numbers::BASELINE;
 use crate::twin::{Noise, ParameterSpace, TwinError};
 use std::fmt;
-
-/// Standard deviation of the factor of a good start.
-const GOOD_SPREAD: f64 = 0.1;
 
 /// Where a baseline starts, in trials where the true θ is known.
 ///
@@ -43,7 +41,7 @@ impl Initialisation {
             Self::Good => {
                 let mut source = noise.source("start");
                 let near: Vec<f64> = (truth.iter())
-                    .map(|v| v * (1.0 + GOOD_SPREAD * source.normal()))
+                    .map(|v| v * (1.0 + BASELINE.good_spread * source.normal()))
                     .collect();
                 space.clamp(&near)
             }

@@ -2,6 +2,7 @@
 
 mod dual_ekf;
 mod initialisation;
+mod numbers;
 mod prediction_error;
 
 pub use dual_ekf::dual_filter;

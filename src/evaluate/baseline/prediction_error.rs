@@ -1,19 +1,11 @@
 //! Fitting the noise-free output.
 
+use super::numbers::BASELINE;
 use crate::evaluate::EvaluateError;
 use crate::math::Stencil;
 use crate::record::Record;
 use crate::twin::{DigitalTwin, SimulationError};
 use nalgebra::{DMatrix, DVector};
-
-/// Steps at most; the paper's six.
-const ITERATIONS: usize = 6;
-/// λ, in squared output units by squared parameter units.
-const RIDGE: f64 = 1e-3;
-/// Step of differences, in prior widths.
-const STEP: f64 = 1e-4;
-/// Halvings of a step before giving up.
-const HALVINGS: usize = 12;
 
 /// Fits θ from `start`, brought into the bounds, with the twin's noise-free output as the prediction:
 ///
@@ -37,25 +29,25 @@ pub fn prediction_error(
     let space = twin.parameters();
     let mut theta = space.clamp(start);
     space.check_point(&theta)?;
-    let steps: Vec<f64> = space.widths().iter().map(|w| STEP * w).collect();
+    let steps: Vec<f64> = space.widths().iter().map(|w| BASELINE.step * w).collect();
     let lower: Vec<f64> = space.bounds().iter().map(|b| b.low()).collect();
     let upper: Vec<f64> = space.bounds().iter().map(|b| b.high()).collect();
     let residual = |theta: &[f64]| residual(twin, record, theta);
 
     let mut here = residual(&theta)?;
-    for _ in 0..ITERATIONS {
+    for _ in 0..BASELINE.iterations {
         let stencil = Stencil::new(&theta, &steps, &lower, &upper)?;
         let Some(jacobian) = unless_diverged(stencil.jacobian(residual))? else {
             break;
         };
         let d = theta.len();
-        let normal = jacobian.tr_mul(&jacobian) + DMatrix::identity(d, d) * RIDGE;
+        let normal = jacobian.tr_mul(&jacobian) + DMatrix::identity(d, d) * BASELINE.ridge;
         let Some(factor) = normal.cholesky() else {
             break;
         };
         let mut step = factor.solve(&-jacobian.tr_mul(&here));
         let mut better = None;
-        for _ in 0..=HALVINGS {
+        for _ in 0..=BASELINE.halvings {
             let moved: Vec<f64> = theta.iter().zip(&step).map(|(a, b)| a + b).collect();
             let to = space.clamp(&moved);
             let there = unless_diverged(residual(&to))?;

@@ -4,17 +4,13 @@ use super::information::problem;
 use super::law::DeparturePlace;
 use super::places::TwinPlaces;
 use super::world::Conditions;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::fit::climb::climb;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::correlation;
 use crate::record::Record;
 use crate::study::Study;
 use statrs::distribution::{ContinuousCDF, Normal};
-
-/// Iterations of the fit of the twin.
-const ITERATIONS: usize = 40;
-/// Probability of a correlation that stands out by chance, over all signals.
-const LEVEL: f64 = 0.05;
 
 /// Place of the signal that the next residual correlates with most; `None` where no correlation stands out, or for a black box.
 pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String>, FilterError> {
@@ -32,7 +28,7 @@ pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String
         records,
     )?;
     let begin = problem.begin(&problem.centre());
-    let Some(fitted) = climb(&problem, &begin, ITERATIONS)? else {
+    let Some(fitted) = climb(&problem, &begin, TRIAL.correlation_iterations)? else {
         return Ok(None);
     };
     let Some(seen) = recoverable(problem.states(&fitted.theta))? else {
@@ -71,7 +67,7 @@ pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String
             }
         }
     }
-    let threshold = Normal::standard().inverse_cdf(1.0 - 0.5 * LEVEL / tests);
+    let threshold = Normal::standard().inverse_cdf(1.0 - 0.5 * TRIAL.correlation_level / tests);
     let best = best.filter(|(size, _)| *size > threshold);
     Ok(best.map(|(_, place)| places.name(place).to_owned()))
 }

@@ -4,12 +4,11 @@ use super::law::{Departure, DepartureLaw, DeparturePlace, LawFamily, RandomLaw};
 use super::listed::{LawForm, ListedLaw, Sign, Sizing, Variant};
 use super::scene::Scene;
 use crate::effect::EffectKey;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::twin::Source;
 
 /// Exponents of power laws that a truth is compared with. 1 and 2 are linear loss and quadratic drag; a quarter is nearly friction.
 const EXPONENTS: [f64; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
-/// Largest size of a random law, in units of the twin's own terms.
-const LARGEST: f64 = 3.0;
 
 /// A departure with its shape, at any size: 1 is as large as the twin's own terms.
 #[derive(Debug, Clone)]
@@ -119,7 +118,7 @@ impl Draft {
     pub fn largest(&self) -> f64 {
         match &self.law {
             DraftLaw::Listed { law, .. } => law.largest,
-            DraftLaw::Random(_) => LARGEST,
+            DraftLaw::Random(_) => TRIAL.largest_law,
         }
     }
 

@@ -1,9 +1,9 @@
 //! Trials written down by hand, for tests of scores and reports.
 
+use super::answer::TrueShare;
 use super::answer::{NamedEffect, Outcome, Refitted, Repeat, TrialAnswer};
 use super::row::TrialRow;
 use super::score::{Scorecard, Setup};
-use super::shares::TrueShare;
 use super::truth::Truth;
 use super::world::Conditions;
 use super::{Kind, TrialSettings};

@@ -29,7 +29,6 @@
 mod answer;
 mod correlation;
 mod draft;
-mod families;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod folder;
@@ -37,22 +36,24 @@ mod information;
 mod kind;
 mod law;
 mod listed;
+mod numbers;
 mod places;
 mod row;
 mod run;
 mod scene;
 mod score;
-mod shares;
+mod settings;
 mod steadiness;
 mod structure;
 mod truth;
 mod units;
 mod world;
 
-pub use families::Families;
 pub use kind::Kind;
+pub use law::Families;
 pub(crate) use row::TrialRow;
-pub(crate) use run::MOST;
-pub use run::{Sealed, TrialSettings, Withheld};
+pub use run::{Sealed, Withheld};
 pub use score::Scorecard;
 pub(crate) use score::{Breakdown, BreakdownLine};
+pub(crate) use settings::MOST;
+pub use settings::TrialSettings;

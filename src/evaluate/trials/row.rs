@@ -1,18 +1,13 @@
 //! One trial: its truth, its answer, and the worth of the answer.
 
-use super::answer::{Outcome, TrialAnswer};
-use super::shares::TrueShare;
+use super::answer::{Outcome, TrialAnswer, TrueShare};
 use super::truth::Truth;
 use crate::diagnose::Decision;
 use crate::effect::EffectKey;
+use crate::evaluate::trials::numbers::TRIAL;
 use serde::Serialize;
 use std::fmt;
 use std::sync::Arc;
-
-/// A twin whose own step shows by more nats than this is no null: its integrator is the gap.
-const COARSE: f64 = 1.0;
-/// A record decides for the truth where every wrong name leaves more nats than this: odds of 20 to 1.
-const CLEAR: f64 = 3.0;
 
 /// Worth of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -145,7 +140,7 @@ impl TrialRow {
 
     /// Returns true if the twin's own step shows.
     pub fn is_coarse(&self) -> bool {
-        self.truth.step > COARSE
+        self.truth.step > TRIAL.coarse_step
     }
 
     /// Returns true if nothing is missing but a finer integration step.
@@ -161,7 +156,7 @@ impl TrialRow {
     /// Returns true if the record decides: every listed effect that is wrong leaves more than 3 nats. False where that is not known.
     pub fn is_clear(&self) -> bool {
         let rival = self.truth.rival.as_ref();
-        rival.is_some_and(|rival| rival.nats > CLEAR)
+        rival.is_some_and(|rival| rival.nats > TRIAL.clear_rival)
     }
 
     /// The evidence that the record holds for its true effect, where it was fitted; a pair has none, since it counts by its weaker one.

@@ -1,5 +1,6 @@
 //! The trials from end to end: sealed, diagnosed, opened, scored.
 
+use super::answer::TrueShare;
 use super::answer::{Question, TrialAnswer};
 use super::correlation::correlated;
 use super::draft::index;
@@ -7,15 +8,16 @@ use super::folder::{ANSWERS, Filling, Folder, SHARES, Which};
 use super::kind::assign_kinds;
 use super::row::TrialRow;
 use super::score::Setup;
-use super::shares::TrueShare;
+use super::settings::MOST;
 use super::steadiness::repeats;
 use super::truth::{Extra, Truth, TruthSampler};
-use super::{Families, Kind, Scorecard};
-use crate::diagnose::{Ablation, DiagnoseSettings, greedy};
+use super::{Kind, Scorecard, TrialSettings};
+use crate::diagnose::{DiagnoseSettings, greedy};
 use crate::evaluate::EvaluateError;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::likelihood::kalman::recoverable;
 use crate::progress::Progress;
-use crate::record::{Record, record_csv_text};
+use crate::record::record_csv_text;
 use crate::setting::SettingError;
 use crate::storage::StorageError;
 use crate::storage::files::sha256;
@@ -30,65 +32,6 @@ use std::time::Instant;
 
 /// Layout of the folder; raised when it changes.
 const LAYOUT: u32 = 12;
-/// Most trials of a folder; their keys are in memory.
-pub(crate) const MOST: usize = 1_000_000;
-/// Trials that are drawn before their records are written.
-const PART: usize = 64;
-
-/// Settings of sealed trials.
-///
-/// | setting | default | meaning |
-/// |---|---|---|
-/// | `trials` | 100 | records |
-/// | `seed` | 1 | of truths, records and diagnoses |
-/// | `kinds` | all | kinds of truth, assigned in the proportions of docs/withheld.md |
-/// | `families` | all | half of the families that random laws come from |
-/// | `like` | no | a measured record whose inputs, length, step and gaps the trials have |
-/// | `without` | no | whether the true effects are taken out of the library: then every trial with one must abstain |
-/// | `validation` | no | whether each trial has a second record |
-/// | `detection_only` | no | whether a diagnosis ends with its verdict: for false alarms over many trials |
-/// | `ablated` | none | parts taken out of the diagnosis, to measure what they are worth |
-/// | `steadiness` | 0 | first trials whose diagnosis is repeated with other seeds, a doubled record, other units, another order of the library |
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrialSettings {
-    /// Records.
-    pub trials: usize,
-    /// Seed of everything random.
-    pub seed: u64,
-    /// Kinds of truth.
-    pub kinds: Vec<Kind>,
-    /// Families of random laws.
-    pub families: Families,
-    /// Record whose inputs, length, step and gaps the trials have.
-    pub like: Option<Record>,
-    /// True if the true effects are taken out of the library.
-    pub without: bool,
-    /// True if each trial has a validation record.
-    pub validation: bool,
-    /// True if a diagnosis ends with its verdict.
-    pub detection_only: bool,
-    /// Parts taken out of the diagnosis.
-    pub ablated: Vec<Ablation>,
-    /// Number of first trials whose diagnosis is repeated.
-    pub steadiness: usize,
-}
-
-impl Default for TrialSettings {
-    fn default() -> Self {
-        Self {
-            trials: 100,
-            seed: 1,
-            kinds: Kind::ALL.to_vec(),
-            families: Families::default(),
-            like: None,
-            without: false,
-            validation: false,
-            detection_only: false,
-            ablated: vec![],
-            steadiness: 0,
-        }
-    }
-}
 
 /// Sealed trials over one study.
 ///
@@ -161,7 +104,7 @@ impl<'a> Withheld<'a> {
         let numbered: Vec<(usize, Kind)> = kinds.into_iter().enumerate().collect();
         let mut keys = Vec::with_capacity(trials);
         // Part by part: the records of a million trials do not fit into memory.
-        for part in numbered.chunks(PART) {
+        for part in numbered.chunks(TRIAL.trials_in_memory) {
             let draw = |&(trial, kind): &(usize, Kind)| {
                 let noise = Noise::new(seed, "withheld", trial as u64);
                 let drawn = (self.sampler).draw(trial, kind, extra(trial), noise)?;

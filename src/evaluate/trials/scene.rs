@@ -2,11 +2,9 @@
 
 use super::law::{Argument, DeparturePlace, LawVariable, Moment};
 use super::world::{Conditions, RecordNoise, System, World, WorldRun};
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::math::{deviation, ends};
 use crate::record::{Drive, Signal};
-
-/// A departure may move an output so many times as far as it moves without one; beyond, the system is another.
-const REACH: f64 = 20.0;
 
 /// Range and spread of one signal.
 #[derive(Debug, Clone, Copy)]
@@ -86,7 +84,7 @@ impl Scene {
     pub fn is_near(&self, run: &WorldRun) -> bool {
         (run.outputs.columns().into_iter().zip(&self.outputs)).all(|(column, size)| {
             let middle = 0.5 * (size.low + size.high);
-            let most = REACH * size.span();
+            let most = TRIAL.output_reach * size.span();
             // A missing sample compares false.
             !column.iter().any(|y| (y - middle).abs() > most)
         })

@@ -4,11 +4,9 @@ use super::answer::{Question, Repeat};
 use super::units::rescaled;
 use crate::diagnose::DiagnoseSettings;
 use crate::evaluate::EvaluateError;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::progress::Progress;
 use crate::record::Record;
-
-/// Seeds besides the trial's own.
-const SEEDS: u64 = 4;
 
 /// Answers under other seeds, from a record twice as long, in other units, and with the library in another order.
 pub(super) fn repeats(
@@ -17,7 +15,7 @@ pub(super) fn repeats(
     progress: &Progress,
 ) -> Result<Vec<Repeat>, EvaluateError> {
     let (study, own) = (question.study, &question.settings);
-    let seeds = (1..=SEEDS).map(|seed| DiagnoseSettings {
+    let seeds = (1..=TRIAL.other_seeds).map(|seed| DiagnoseSettings {
         seed: own.seed.wrapping_add(seed),
         ..own.clone()
     });

@@ -10,16 +10,8 @@
 
 use super::law::DeparturePlace;
 use super::scene::{Extent, Scene};
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::twin::{Now, StateSpace};
-
-/// Moments of the record at which equations are compared.
-const MOMENTS: usize = 6;
-/// Step of a difference, as a share of a parameter's prior or of an input's range.
-const STEP: f64 = 1e-3;
-/// Step to another value of a state or input, as a share of its range.
-const OTHER: f64 = 0.1;
-/// Relative change of a slope that rounding makes.
-const SAME: f64 = 1e-6;
 
 /// States and sensors that something enters.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -77,8 +69,8 @@ impl Structure {
         let outline = twin.outline();
         let (states, outputs) = (outline.states.len(), outline.outputs.len());
         let (run, samples) = (&scene.run, scene.run.drive.samples());
-        let moments: Vec<At> = (0..MOMENTS.min(samples))
-            .map(|m| (2 * m + 1) * samples / (2 * MOMENTS))
+        let moments: Vec<At> = (0..TRIAL.structure_moments.min(samples))
+            .map(|m| (2 * m + 1) * samples / (2 * TRIAL.structure_moments))
             .map(|k| At {
                 t: run.drive.time(k),
                 dt: scene.dt,
@@ -110,13 +102,13 @@ impl Structure {
             )
         };
         let steps: Vec<f64> = (outline.parameters.iter())
-            .map(|p| STEP * p.prior.width())
+            .map(|p| TRIAL.structure_step * p.prior.width())
             .collect();
         let parameters: Vec<Entries> = (steps.iter().enumerate())
             .map(|(p, step)| entered(&|at: &mut At| at.theta[p] += step))
             .collect();
         let inputs: Vec<Entries> = (scene.inputs.iter().enumerate())
-            .map(|(j, size)| entered(&|at: &mut At| at.u[j] += OTHER * size.span()))
+            .map(|(j, size)| entered(&|at: &mut At| at.u[j] += TRIAL.structure_range * size.span()))
             .collect();
         let is_state = |place: &DeparturePlace| matches!(place, DeparturePlace::State(_));
         let gains = (steps.iter().zip(&parameters).enumerate())
@@ -174,12 +166,13 @@ fn gain(
         moments.iter().zip(&slopes).any(|(at, own)| {
             let there = slope(&at.changed(change));
             // A slope that is no number is nobody's gain.
-            !(own.iter().zip(there)).all(|(own, there)| (own - there).abs() <= SAME * most)
+            !(own.iter().zip(there))
+                .all(|(own, there)| (own - there).abs() <= TRIAL.structure_rounding * most)
         })
     };
-    let step_of = |size: &Extent| OTHER * size.span();
+    let step_of = |size: &Extent| TRIAL.structure_range * size.span();
     let mut states = scene.states.iter().enumerate();
-    if decides(&|at: &mut At| at.t += OTHER * scene.duration)
+    if decides(&|at: &mut At| at.t += TRIAL.structure_range * scene.duration)
         || states.any(|(i, size)| decides(&|at: &mut At| at.x[i] += step_of(size)))
     {
         return None;

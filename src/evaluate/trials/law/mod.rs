@@ -6,7 +6,9 @@
 //! | `force.rs` | terms in the rate of a state |
 //! | `parameter.rs` | changes of a parameter over time |
 //! | `random.rs`, `tree.rs`, `waves.rs` | functions that are drawn anew for each trial |
+//! | `families.rs` | their halves: one to choose constants with, one for reports |
 
+mod families;
 mod force;
 mod parameter;
 mod random;
@@ -14,6 +16,7 @@ mod signal;
 mod tree;
 mod waves;
 
+pub use families::Families;
 pub(super) use force::{ForceDeparture, Wave};
 pub(super) use parameter::ParameterDeparture;
 pub(super) use random::{Argument, LawFamily, LawVariable, RandomLaw};

@@ -1,11 +1,9 @@
 //! Distortions of a signal, sample by sample.
 
 use super::above;
+use crate::evaluate::trials::numbers::TRIAL;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
-
-/// Steps of a lag that is integrated, per sample.
-const FINE: usize = 20;
 
 /// A law from one signal to another.
 ///
@@ -68,9 +66,9 @@ impl SignalDeparture {
             },
             Self::Lag { tau } => follow(memory, v, |z, _| z + (1.0 - (-dt / tau).exp()) * (v - z)),
             Self::LowPass { cutoff } => follow(memory, v, |mut z, before| {
-                let h = 2.0 * PI * cutoff * dt / FINE as f64;
-                for i in 1..=FINE {
-                    let now = before + (v - before) * i as f64 / FINE as f64;
+                let h = 2.0 * PI * cutoff * dt / TRIAL.lag_steps as f64;
+                for i in 1..=TRIAL.lag_steps {
+                    let now = before + (v - before) * i as f64 / TRIAL.lag_steps as f64;
                     z = (z + h * now) / (1.0 + h);
                 }
                 z

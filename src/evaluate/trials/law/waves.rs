@@ -1,11 +1,9 @@
 //! Samples of Gaussian processes by random Fourier features.
 
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::twin::Source;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-
-/// Features of a sample.
-const FEATURES: usize = 24;
 
 /// One sample of a stationary Gaussian process with a squared-exponential covariance: Σ a·cos(w·z + b).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,9 +17,9 @@ pub(in crate::evaluate::trials) struct Waves {
 impl Waves {
     /// Draws a sample over standardised arguments; `length` is its length scale in their unit.
     pub fn draw(arguments: usize, length: f64, source: &mut Source) -> Self {
-        let scale = (2.0 / FEATURES as f64).sqrt();
+        let scale = (2.0 / TRIAL.wave_features as f64).sqrt();
         let (mut frequencies, mut amplitudes, mut phases) = (vec![], vec![], vec![]);
-        for _ in 0..FEATURES {
+        for _ in 0..TRIAL.wave_features {
             frequencies.push((0..arguments).map(|_| source.normal() / length).collect());
             amplitudes.push(scale * source.normal());
             phases.push(TAU * source.uniform());

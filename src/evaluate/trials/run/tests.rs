@@ -1,4 +1,5 @@
 use super::*;
+use crate::diagnose::Ablation;
 use crate::storage::files::sha256;
 use crate::study::{RecordPlan, StudyFile};
 use crate::twins::VanDerPol;

@@ -1,14 +1,12 @@
 //! Scores of the stated probabilities of the effects and of *none of these*, over gaps with one departure.
 
 use crate::evaluate::trials::Kind;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::row::TrialRow;
-
-/// A truth of probability 0 costs as much as one of this.
-const LEAST: f64 = 1e-3;
 
 /// Logarithm of the probability of the truth, at least ln 0.001.
 pub(super) fn log_score(row: &TrialRow) -> Option<f64> {
-    scores(row).map(|(truth, _)| truth.max(LEAST).ln())
+    scores(row).map(|(truth, _)| truth.max(TRIAL.least_probability).ln())
 }
 
 /// Squared error over all outcomes: 0 perfect, 2 certain and wrong.

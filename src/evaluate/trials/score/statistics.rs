@@ -4,12 +4,11 @@ use super::probabilities::{brier, log_score};
 use crate::diagnose::Decision;
 use crate::evaluate::Count;
 use crate::evaluate::trials::answer::Outcome;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::row::{Fate, TrialRow};
 use crate::math::quantile;
 use serde_json::{Value, json};
 
-/// Expected information that a diagnosis need not see, in nats.
-const FAINT: f64 = 3.0;
 /// Range of a share that is reported beside a right effect.
 const WITHIN: std::ops::RangeInclusive<f64> = -0.1..=1.1;
 
@@ -144,7 +143,9 @@ fn false_alarm(row: &TrialRow) -> Count {
 }
 
 fn is_faint(row: &TrialRow) -> bool {
-    row.truth.information.is_some_and(|nats| nats < FAINT)
+    row.truth
+        .information
+        .is_some_and(|nats| nats < TRIAL.faint_gap)
 }
 
 fn called(row: &TrialRow) -> Count {

@@ -1,10 +1,10 @@
 use super::*;
 use crate::diagnose::Decision;
 use crate::evaluate::trials::Kind;
+use crate::evaluate::trials::answer::TrueShare;
 use crate::evaluate::trials::answer::{NamedEffect, Outcome, Repeat};
 use crate::evaluate::trials::fixture::{abstaining, card, failed, row};
 use crate::evaluate::trials::row::{Fate, TrialRow};
-use crate::evaluate::trials::shares::TrueShare;
 use crate::evaluate::trials::truth::Rival;
 
 fn outcome(row: &mut TrialRow) -> &mut Outcome {

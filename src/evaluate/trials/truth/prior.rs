@@ -2,16 +2,11 @@
 
 use crate::evaluate::trials::Kind;
 use crate::evaluate::trials::draft::index;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::scene::Scene;
 use crate::evaluate::trials::world::{Conditions, Feedback, NuisanceKind};
 use crate::twin::{Parameter, ParameterSpace, Role, Source};
 
-/// Probability that a trial has a nuisance.
-const NUISANCE: f64 = 0.5;
-/// Factors on declared noise levels: from 0.3 to 3.
-const FACTOR: f64 = 3.0;
-/// Measurement noise of a twin that declares none: part of an output's deviation.
-const QUIET: f64 = 0.03;
 /// Lags in samples at which an output may answer an input, for the sign of a feedback.
 const LAGS: [usize; 6] = [0, 1, 3, 8, 20, 50];
 
@@ -100,11 +95,14 @@ pub(super) fn conditions(
 ) -> Conditions {
     let mut conditions = Conditions::declared();
     if is_silent {
-        let levels = scene.outputs.iter().map(|size| QUIET * size.deviation);
+        let levels = scene
+            .outputs
+            .iter()
+            .map(|size| TRIAL.silent_noise * size.deviation);
         conditions.added = levels.collect();
     }
     // Both draws are made whatever comes of them.
-    let (happens, choice) = (source.happens(NUISANCE), source.uniform());
+    let (happens, choice) = (source.happens(TRIAL.nuisance_probability), source.uniform());
     if !happens || allowed.is_empty() {
         return conditions;
     }
@@ -113,7 +111,7 @@ pub(super) fn conditions(
     match conditions.nuisance {
         NuisanceKind::None => {}
         NuisanceKind::Level => {
-            let mut factor = || FACTOR.powf(between(source, -1.0, 1.0));
+            let mut factor = || TRIAL.noise_factor.powf(between(source, -1.0, 1.0));
             (conditions.process, conditions.measurement) = (factor(), factor());
         }
         NuisanceKind::Coloured => conditions.colour = between(source, 0.3, 0.9),

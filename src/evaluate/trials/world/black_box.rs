@@ -2,13 +2,9 @@
 
 use super::{RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{DepartureLaw, DeparturePlace, Moment};
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::record::{Drive, Signal};
 use crate::twin::DigitalTwin;
-
-/// Values of a parameter that a run is made for, where it changes with time.
-const VALUES: usize = 9;
-/// An output beyond this has diverged, in any unit.
-const BEYOND: f64 = 1e12;
 
 /// Makes a record; `None` where the simulator fails or diverges.
 pub(super) fn run(
@@ -47,7 +43,7 @@ pub(super) fn run(
             *y += level * measurement[j].next();
         }
     }
-    if !outputs.iter().all(|y| y.abs() < BEYOND) {
+    if !outputs.iter().all(|y| y.abs() < TRIAL.diverged) {
         return None;
     }
     conditions.empty(&mut outputs, draws.process);
@@ -101,8 +97,8 @@ fn simulated(
     if low == high {
         return one(system.theta);
     }
-    let step = (high - low) / (VALUES - 1) as f64;
-    let runs = (0..VALUES)
+    let step = (high - low) / (TRIAL.parameter_values - 1) as f64;
+    let runs = (0..TRIAL.parameter_values)
         .map(|m| {
             let mut theta = system.theta.to_vec();
             theta[i] = low + step * m as f64;
@@ -111,8 +107,8 @@ fn simulated(
         .collect::<Option<Vec<Signal>>>()?;
     let (rows, columns) = runs[0].dim();
     Some(Signal::from_shape_fn((rows, columns), |(k, j)| {
-        let place = ((values[k] - low) / step).clamp(0.0, (VALUES - 1) as f64);
-        let m = (place as usize).min(VALUES - 2);
+        let place = ((values[k] - low) / step).clamp(0.0, (TRIAL.parameter_values - 1) as f64);
+        let m = (place as usize).min(TRIAL.parameter_values - 2);
         let share = place - m as f64;
         (1.0 - share) * runs[m][[k, j]] + share * runs[m + 1][[k, j]]
     }))

@@ -1,12 +1,10 @@
 //! Conditions of a record that are no gap of the twin: noise, start, feedback, missing samples.
 
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::record::Signal;
 use crate::twin::{Noise, Source};
 use serde::{Deserialize, Serialize};
 use std::fmt;
-
-/// Mean length of a gap, in samples.
-const GAP: f64 = 4.0;
 
 /// Kind of condition that the twin does not describe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -104,7 +102,7 @@ impl Conditions {
         if self.gaps <= 0.0 {
             return;
         }
-        let begins = self.gaps / (GAP * (1.0 - self.gaps));
+        let begins = self.gaps / (TRIAL.gap_length * (1.0 - self.gaps));
         for (j, mut channel) in outputs.columns_mut().into_iter().enumerate() {
             let mut source = noise.source(&format!("world/gaps/{j}"));
             let mut inside = false;
@@ -112,7 +110,7 @@ impl Conditions {
             let last = channel.len().saturating_sub(3);
             for (k, value) in channel.iter_mut().enumerate() {
                 inside = match inside {
-                    true => !source.happens(1.0 / GAP),
+                    true => !source.happens(1.0 / TRIAL.gap_length),
                     false => source.happens(begins),
                 };
                 if inside && (3..last).contains(&k) {

@@ -2,14 +2,10 @@
 
 use super::{RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, Moment, above};
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::record::{Drive, Signal};
 use crate::twin::{Acting, DeadTime, Interval, Noise, Now, StateSpace};
 use ndarray::ArrayView1;
-
-/// Steps of the integrator within a sample.
-const SUBSTEPS: usize = 10;
-/// A state beyond this has diverged, in any unit.
-const BEYOND: f64 = 1e12;
 
 /// Makes a record; `None` where a state diverges.
 pub(super) fn run(
@@ -98,7 +94,7 @@ pub(super) fn run(
         twin.constrain(&now, &mut x);
         plant.overflow(&mut x);
         plant.limit(&mut x);
-        let finite = |v: &f64| v.abs() < BEYOND;
+        let finite = |v: &f64| v.abs() < TRIAL.diverged;
         if !x.iter().all(finite) || !y.iter().all(finite) {
             return None;
         }
@@ -236,13 +232,13 @@ impl Plant<'_> {
 
     /// Carries the state to the next sample.
     fn advance(&mut self, now: &Now<'_>, next: &[f64], command: &[f64], x: &mut [f64]) {
-        let h = now.dt / SUBSTEPS as f64;
+        let h = now.dt / TRIAL.world_substeps as f64;
         let mut inputs = now.u.to_vec();
         let hold = self.twin.stepping().hold;
-        for step in 0..SUBSTEPS {
+        for step in 0..TRIAL.world_substeps {
             for (stage, part) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
-                let share = (step as f64 + part) / SUBSTEPS as f64;
-                let of_next = hold.share(step, SUBSTEPS, part);
+                let share = (step as f64 + part) / TRIAL.world_substeps as f64;
+                let of_next = hold.share(step, TRIAL.world_substeps, part);
                 for ((u, from), to) in inputs.iter_mut().zip(now.u).zip(next) {
                     *u = from + of_next * (to - from);
                 }

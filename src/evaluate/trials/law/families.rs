@@ -1,6 +1,6 @@
 //! Halves of the generator's families: one to choose constants with, one for reports.
 
-use super::law::{DeparturePlace, LawFamily};
+use super::{DeparturePlace, LawFamily};
 use crate::twin::Noise;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -55,7 +55,7 @@ fn kind_of(place: DeparturePlace) -> &'static str {
 
 impl Families {
     /// Families of this half at a place. Each kind of place has half of them in either half.
-    pub(super) fn at(self, place: DeparturePlace) -> Vec<LawFamily> {
+    pub(in crate::evaluate::trials) fn at(self, place: DeparturePlace) -> Vec<LawFamily> {
         let mut all: Vec<(f64, LawFamily)> = (LawFamily::all().into_iter())
             .map(|family| {
                 let name = format!("{family}/{}", kind_of(place));
