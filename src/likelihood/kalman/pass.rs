@@ -247,6 +247,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         let (means, covs) = self.copy.slices(n);
         for lane in 0..N::LANES {
             let i = held_by(lane, self.jobs.len());
+            mean.fill(0.0);
             cov.fill(0.0);
             (self.jobs[i].kalman).start(&self.now[i], &mut mean, &mut cov, &mut scale);
             let to = means.iter_mut().chain(&mut *covs);

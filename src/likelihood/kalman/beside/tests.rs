@@ -49,7 +49,8 @@ fn agree(twin: &dyn StateSpace, centre: &[f64], record: &Record, settings: &Filt
         assert!(error < 1e-10, "lane {lane}: {found} {expected}");
         for (k, [e, s]) in lanes.rows.iter().enumerate() {
             let (scale, variance) = (s.0[lane].sqrt(), scalar.covariances[[k, 0, 0]]);
-            assert!((e.0[lane] - scalar.innovations[[k, 0]]).abs() < 1e-10 * scale);
+            // A point within rounding of a limit, where a root bends without end, is moved by the root of rounding.
+            assert!((e.0[lane] - scalar.innovations[[k, 0]]).abs() < 1e-9 * scale);
             assert!((s.0[lane] / variance - 1.0).abs() < 1e-10);
         }
     }
@@ -152,7 +153,7 @@ fn no_lane_changes_a_bit_of_another() {
     }
 }
 
-/// Twins that lanes do not hold go the scalar way, errors included.
+/// A θ that lanes do not hold goes the scalar way, errors included; a sensor that bends its signal goes side by side.
 #[test]
 fn what_lanes_do_not_hold_is_run_one_by_one() {
     let settings = FilterSettings::default();
@@ -173,8 +174,10 @@ fn what_lanes_do_not_hold_is_run_one_by_one() {
     let theta = [&CENTRE[..], &[0.0, 2.0]].concat();
     let measured = record(twin.as_ref(), &theta, &tanks_drive(), 0);
     let kalman = Kalman::new(twin.as_ref(), &measured, &settings).unwrap();
-    assert!(together(&[(&kalman, &theta)]).is_none());
+    assert!(together(&[(&kalman, &theta)]).is_some());
     let coordinates = Coordinates::new(kalman.parameters());
     let one = Score::forward_one_by_one(&kalman, &theta, &coordinates).unwrap();
-    assert_eq!(Score::forward(&kalman, &theta, &coordinates).unwrap(), one);
+    let beside = Score::forward(&kalman, &theta, &coordinates).unwrap();
+    assert!((beside.log_likelihood - one.log_likelihood).abs() < 1e-9);
+    assert!((&beside.gradient - &one.gradient).amax() < 1e-5);
 }
