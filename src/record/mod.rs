@@ -7,7 +7,6 @@
 //! | read and write CSV, read Parquet | [`Record::read`], [`Record::write`], [`Drive::read`] |
 
 mod channels;
-mod columns;
 mod csv;
 mod drive;
 mod error;
@@ -18,14 +17,12 @@ mod rounding;
 mod stamp;
 mod table;
 mod text;
-mod write;
 
+pub(crate) use channels::Columns;
 pub use channels::{Quantity, Signals};
-pub(crate) use columns::Columns;
-pub(crate) use csv::{RecordReader, parse_record};
+pub(crate) use csv::{RecordReader, drive_csv_text, parse_record, record_csv_text};
 pub use drive::{Drive, Signal};
 pub use error::RecordError;
 pub use measured::Record;
 pub(crate) use resample::{InputRule, Resampled, resample};
 pub(crate) use rounding::{distinct, step_of};
-pub(crate) use write::{drive_csv_text, record_csv_text};

@@ -1,7 +1,6 @@
 //! The numbers of a record file, checked cell by cell.
 
-use super::channels::{Signals, column_names};
-use super::columns::Columns;
+use super::channels::{Columns, Signals, column_names};
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};
 use crate::record::{Drive, Record, RecordError, Signal};

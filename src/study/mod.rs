@@ -3,7 +3,6 @@
 mod error;
 mod file;
 mod fit;
-mod lines;
 mod manifest;
 mod plan;
 mod prior;

@@ -14,7 +14,6 @@ mod manifest;
 mod pieces;
 mod ranks;
 mod share;
-mod thread_groups;
 
 pub(crate) use folder::NewWork;
 pub use folder::WorkFolder;
