@@ -5,7 +5,7 @@ use super::evidence::{Evidence, Purpose, Question};
 use super::explanations::are_outliers_elsewhere;
 use crate::diagnose::thresholds::Thresholds;
 use crate::hypothesis::explanation::Explanation;
-use crate::hypothesis::search::FEW;
+use crate::hypothesis::search::{Breadth, FEW};
 use crate::hypothesis::set::TermSet;
 
 /// Stage of a search; each ends with a step of progress.
@@ -47,50 +47,30 @@ impl<E: Evidence> Search<E> {
         let question = self.ask(Purpose::Functions, TermSet::default())?;
         Some(match self.begin {
             Begin::Afresh => question,
-            Begin::WithFits => few(question),
+            Begin::WithFits => question.with(Breadth::few),
             Begin::Carried => {
-                let best = self.known.unknown();
-                let only = best.iter().take(FEW).map(|e| e.last().key()).collect();
-                let from = self.best_listed();
-                few(Question {
-                    only: Some(only),
-                    from,
-                    ..question
-                })
+                let best = keys(self.known.unknown().into_iter().take(FEW));
+                question.only(best).from(self.best_listed()).with(Breadth::few)
             }
         })
     }
 
     fn effects(&self) -> Option<Question> {
         let gap = self.known.best_unknown();
-        let question = self.ask(Purpose::Effects, TermSet::default());
-        if let Some(question) = question {
-            let for_gap = question.breadth.for_gap(gap);
+        let all = |breadth: Breadth| breadth.for_gap(gap).of_all().afresh();
+        if let Some(question) = self.ask(Purpose::Effects, TermSet::default()) {
             return Some(match self.begin {
-                Begin::Afresh if gap > Thresholds::NULL_LIKE => Question {
-                    breadth: for_gap.of_all().afresh(),
-                    ..question
-                },
-                Begin::Afresh => Question {
-                    breadth: for_gap,
-                    ..question
-                },
-                Begin::WithFits => of_all(question),
-                Begin::Carried => Question {
-                    only: Some(self.standing_out().iter().map(|e| e.last().key()).collect()),
-                    ..question
-                },
+                Begin::Afresh if gap > Thresholds::NULL_LIKE => question.with(all),
+                Begin::Afresh => question.with(|breadth| breadth.for_gap(gap)),
+                Begin::WithFits => question.with(Breadth::of_all),
+                Begin::Carried => question.only(keys(self.standing_out().into_iter())),
             });
         }
         // A fit that has nothing to answer for is where it should be.
         let is_missed = gap <= Thresholds::NULL_LIKE && self.known.top() > Thresholds::NULL_LIKE;
-        let question = (self.begin == Begin::Afresh && is_missed)
-            .then(|| self.ask(Purpose::AllEffects, TermSet::default()))??;
-        let breadth = question.breadth.for_gap(gap).of_all().afresh();
-        Some(Question {
-            breadth,
-            ..question
-        })
+        let asks = self.begin == Begin::Afresh && is_missed;
+        let question = asks.then(|| self.ask(Purpose::AllEffects, TermSet::default()))??;
+        Some(question.with(all))
     }
 
     fn noise(&self) -> Option<Question> {
@@ -103,26 +83,22 @@ impl<E: Evidence> Search<E> {
             .filter(|e| self.known.gain(e) > Thresholds::WIDER);
         let wider = best.and_then(|_| self.ask(Purpose::WiderFunctions, TermSet::default()));
         if let Some(question) = wider {
-            let from = self.best_listed();
-            return Some(few(Question { from, ..question }));
+            return Some(question.from(self.best_listed()).with(Breadth::few));
         }
         if let Some(question) = self.ask(Purpose::Noise, TermSet::default()) {
-            return Some(of_all(question));
+            return Some(question.with(Breadth::of_all));
         }
         let noise = self.known.noise();
         let likely = noise
             .first()
             .filter(|e| self.known.gain(e) > Thresholds::NOISE);
         if let Some(question) = likely.and_then(|e| self.ask(Purpose::NoisePairs, e.set())) {
-            return Some(of_all(question));
+            return Some(question.with(Breadth::of_all));
         }
         let best = best?;
         let question = self.ask(Purpose::Outliers, best.set())?;
-        let outliers = noise.iter().filter(|e| are_outliers_elsewhere(e, best));
-        Some(of_all(Question {
-            only: Some(outliers.map(|e| e.last().key()).collect()),
-            ..question
-        }))
+        let outliers = noise.into_iter().filter(|e| are_outliers_elsewhere(e, best));
+        Some(question.only(keys(outliers)).with(Breadth::of_all))
     }
 
     /// Asks what single effects leave, until one leaves nothing.
@@ -158,12 +134,8 @@ impl<E: Evidence> Search<E> {
         let pair = self.known.winning_pair()?;
         if let Some(question) = self.ask(Purpose::Singles, TermSet::default()) {
             let keys = pair.terms.iter().map(|term| term.key()).collect();
-            return Some(of_all(Question {
-                only: Some(keys),
-                from: vec![pair.set()],
-                breadth: question.breadth.for_gap(self.known.best_unknown()),
-                ..question
-            }));
+            let question = question.only(keys).from(vec![pair.set()]);
+            return Some(question.with(|breadth| self.for_gap(breadth).of_all()));
         }
         if !is_new {
             return None;
@@ -171,7 +143,7 @@ impl<E: Evidence> Search<E> {
         let singles = self.known.singles_of(pair).into_iter();
         let mut questions = singles.filter_map(|e| self.ask(Purpose::NoiseInstead, e.set()));
         if let Some(question) = questions.next() {
-            return Some(of_all(question));
+            return Some(question.with(Breadth::of_all));
         }
         self.ask_remains(self.known.noise_instead_of_second()?)
     }
@@ -190,15 +162,13 @@ impl<E: Evidence> Search<E> {
         };
         let question = (firsts.into_iter()).find_map(|e| self.ask(Purpose::Pairs, e.set()))?;
         let count = self.budget.seconds[usize::from(enough.is_some())];
-        let mut breadth = question.breadth.for_gap(self.known.best_unknown());
-        breadth.listed = count;
-        breadth.annealed = count.min(breadth.annealed);
-        breadth.least = self.budget.least_second;
-        Some(Question {
-            from: self.best_listed(),
-            breadth,
-            ..question
-        })
+        let question = question.from(self.best_listed());
+        Some(question.with(|breadth| Breadth {
+            listed: count,
+            annealed: count.min(breadth.annealed),
+            least: self.budget.least_second,
+            ..self.for_gap(breadth)
+        }))
     }
 
     /// The second effect of a pair that wins beside the rivals of the first.
@@ -214,12 +184,8 @@ impl<E: Evidence> Search<E> {
             .filter(|e| ![first.key(), second.key()].contains(&e.last().key()));
         let mut rivals = rivals.take(self.budget.singles);
         let question = rivals.find_map(|e| self.ask(Purpose::RivalPairs, e.set()))?;
-        Some(Question {
-            only: Some(vec![second.key()]),
-            from: self.best_listed(),
-            breadth: question.breadth.for_gap(self.known.best_unknown()),
-            ..question
-        })
+        let question = question.only(vec![second.key()]).from(self.best_listed());
+        Some(question.with(|breadth| self.for_gap(breadth)))
     }
 
     /// Asks what remains beside the best sets.
@@ -284,12 +250,13 @@ impl<E: Evidence> Search<E> {
 
     fn ask_remains(&self, explanation: &Explanation) -> Option<Question> {
         let question = self.ask(Purpose::Remains, explanation.set())?;
-        let breadth = question.breadth.for_gap(self.known.best_unknown());
-        Some(few(Question {
-            from: vec![explanation.set()],
-            breadth,
-            ..question
-        }))
+        let question = question.from(vec![explanation.set()]);
+        Some(question.with(|breadth| self.for_gap(breadth).few()))
+    }
+
+    /// Effort for a gap as large as the best unknown function tells.
+    fn for_gap(&self, breadth: Breadth) -> Breadth {
+        breadth.for_gap(self.known.best_unknown())
     }
 
     /// Returns whether the search goes on to pairs and remains: something is missing, and no other kind of noise comes first. Where that
@@ -322,16 +289,7 @@ impl<E: Evidence> Search<E> {
     }
 }
 
-fn few(question: Question) -> Question {
-    Question {
-        breadth: question.breadth.few(),
-        ..question
-    }
-}
-
-fn of_all(question: Question) -> Question {
-    Question {
-        breadth: question.breadth.of_all(),
-        ..question
-    }
+/// Keys of the last terms.
+fn keys<'e>(explanations: impl Iterator<Item = &'e Explanation>) -> Vec<String> {
+    explanations.map(|e| e.last().key()).collect()
 }

@@ -60,6 +60,23 @@ pub(in crate::diagnose) struct Question {
 }
 
 impl Question {
+    /// The question about these terms alone.
+    pub fn only(self, keys: Vec<String>) -> Self {
+        let only = Some(keys);
+        Self { only, ..self }
+    }
+
+    /// The question with fits from θ of these sets as well.
+    pub fn from(self, from: Vec<TermSet>) -> Self {
+        Self { from, ..self }
+    }
+
+    /// The question with another effort.
+    pub fn with(self, change: impl FnOnce(Breadth) -> Breadth) -> Self {
+        let breadth = change(self.breadth);
+        Self { breadth, ..self }
+    }
+
     /// Family of the terms that are added.
     pub fn family(&self) -> Family {
         use Purpose::*;

@@ -23,8 +23,6 @@ mod change;
 mod evidence;
 mod explanations;
 mod setup;
-#[cfg(test)]
-mod tests;
 
 use self::agenda::{Begin, Stage};
 use self::budget::Budget;
@@ -247,3 +245,6 @@ impl<E: Evidence> Search<E> {
         self.known.posterior().log_odds > Thresholds::GAP
     }
 }
+
+#[cfg(test)]
+mod tests;
