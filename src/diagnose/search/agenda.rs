@@ -50,7 +50,10 @@ impl<E: Evidence> Search<E> {
             Begin::WithFits => question.with(Breadth::few),
             Begin::Carried => {
                 let best = keys(self.known.unknown().into_iter().take(FEW));
-                question.only(best).from(self.best_listed()).with(Breadth::few)
+                question
+                    .only(best)
+                    .from(self.best_listed())
+                    .with(Breadth::few)
             }
         })
     }
@@ -97,7 +100,9 @@ impl<E: Evidence> Search<E> {
         }
         let best = best?;
         let question = self.ask(Purpose::Outliers, best.set())?;
-        let outliers = noise.into_iter().filter(|e| are_outliers_elsewhere(e, best));
+        let outliers = noise
+            .into_iter()
+            .filter(|e| are_outliers_elsewhere(e, best));
         Some(question.only(keys(outliers)).with(Breadth::of_all))
     }
 
