@@ -13,8 +13,8 @@ impl EstimateRun<'_> {
         &self,
         simulator: &FeatureSimulator,
     ) -> Result<FeatureSimulator, EstimatorError> {
-        Ok(match self.drawn {
-            Some(twin) => simulator.of(twin, None)?,
+        Ok(match self.fit {
+            Some(fit) => simulator.of(&fit.drawn, None)?,
             None => simulator.clone(),
         })
     }

@@ -30,7 +30,7 @@ use crate::estimator::refine::{FeatureInformation, RefineSettings, Refinement};
 use crate::estimator::settings::Settings;
 use crate::progress::Progress;
 use crate::record::Record;
-use crate::twin::{Noise, Twin};
+use crate::twin::Noise;
 use nalgebra::DVector;
 use outcome::Seconds;
 use record_fit::RecordFit;
@@ -94,56 +94,26 @@ impl Estimator {
             settings,
             record,
             observed: &observed,
-            drawn: taken.map(|fit| &fit.drawn),
+            fit: taken,
             noise: Noise::new(options.seed, "estimate", 0),
             seed: options.seed,
             progress,
         };
         let gate = run.gate(&simulator, &initial.theta)?;
         let seconds = (predict, lap.elapsed().as_secs_f64());
-        let twin = simulator.twin();
-        // A free run may diverge where noisy runs do not; the estimate stands all the same.
-        let follow = |theta: &[f64], record: &Record| track(twin, theta, record).ok();
         let is_kept = steps.trusts_prior && !gate.out_of_distribution && !options.always_refine;
-        let (stages, tracking) = if is_kept {
-            let information = run.information(&simulator, &initial.theta)?;
-            (
-                Stages::Kept(KeptEstimate { information }),
-                follow(&initial.theta, record),
-            )
-        } else {
-            let bound = taken.map(|fit| simulator.of(&fit.twin, Some(&*self.recipe)));
-            let bound = bound.transpose()?;
-            let region = taken.and_then(|fit| fit.fit.region.as_ref());
-            let bound = bound.as_ref().unwrap_or(&simulator);
-            let mut refit = run.refit(bound, &initial.theta, region)?;
-            let tracking = follow(&refit.answer.theta, record);
-            refit.tracking_initial = follow(&initial.theta, record);
-            refit.is_refused = steps.compares && {
-                let [own, first] = [
-                    (&refit.answer.theta[..], tracking.as_ref()),
-                    (&initial.theta[..], refit.tracking_initial.as_ref()),
-                ];
-                explains_worse(
-                    twin,
-                    record,
-                    own,
-                    first,
-                    Noise::new(options.seed, "merit", 0),
-                )
-            };
-            let tracking = match refit.is_refused {
-                true => refit.tracking_initial.clone(),
-                false => tracking,
-            };
-            (Stages::Refitted(Box::new(refit)), tracking)
+        let (stages, tracking) = match is_kept {
+            true => run.keep(&simulator, &initial)?,
+            false => run.refine(&simulator, &initial, steps)?,
         };
         let answer = match &stages {
             Stages::Refitted(refit) if !refit.is_refused => refit.answer.clone(),
             _ => initial.clone(),
         };
         let fitted = tracking.as_ref().map_or(&answer.theta, |run| &run.theta);
-        let validation = (options.validation.as_ref()).and_then(|record| follow(fitted, record));
+        let twin = simulator.twin();
+        let validation =
+            (options.validation.as_ref()).and_then(|record| track(twin, fitted, record).ok());
         let space = twin.parameters();
         let mut estimate = Estimate {
             names: space.names().into_iter().map(str::to_owned).collect(),
@@ -188,8 +158,8 @@ struct EstimateRun<'a> {
     settings: &'a Settings,
     record: &'a Record,
     observed: &'a DVector<f64>,
-    /// The twin in levels of noise drawn from the record's fit, for the tests.
-    drawn: Option<&'a Twin>,
+    /// The record's fit, where the preset takes its noise.
+    fit: Option<&'a RecordFit>,
     noise: Noise,
     seed: u64,
     progress: &'a Progress,
@@ -211,6 +181,51 @@ impl EstimateRun<'_> {
             noise: self.noise.child("refine"),
             progress: self.progress,
         }
+    }
+
+    /// Keeps the network's estimate.
+    fn keep(
+        &self,
+        simulator: &FeatureSimulator,
+        initial: &PointEstimate,
+    ) -> Result<(Stages, Option<Tracking>), EstimatorError> {
+        let information = self.information(simulator, &initial.theta)?;
+        // A free run may diverge where noisy runs do not; the estimate stands all the same.
+        let tracking = track(simulator.twin(), &initial.theta, self.record).ok();
+        Ok((Stages::Kept(KeptEstimate { information }), tracking))
+    }
+
+    /// Refits the record, and follows it with what explains it better.
+    fn refine(
+        &self,
+        simulator: &FeatureSimulator,
+        initial: &PointEstimate,
+        steps: Steps,
+    ) -> Result<(Stages, Option<Tracking>), EstimatorError> {
+        let recipe = &*self.estimator.recipe;
+        let bound = self.fit.map(|fit| simulator.of(&fit.twin, Some(recipe)));
+        let bound = bound.transpose()?;
+        let bound = bound.as_ref().unwrap_or(simulator);
+        let region = self.fit.and_then(|fit| fit.fit.region.as_ref());
+        let mut refit = self.refit(bound, &initial.theta, region)?;
+        let twin = simulator.twin();
+        let [tracking, first] =
+            [&refit.answer, initial].map(|at| track(twin, &at.theta, self.record).ok());
+        let noise = Noise::new(self.seed, "merit", 0);
+        refit.is_refused = steps.compares
+            && explains_worse(
+                twin,
+                self.record,
+                (&refit.answer.theta, tracking.as_ref()),
+                (&initial.theta, first.as_ref()),
+                noise,
+            );
+        let tracking = match refit.is_refused {
+            true => first.clone(),
+            false => tracking,
+        };
+        refit.tracking_initial = first;
+        Ok((Stages::Refitted(Box::new(refit)), tracking))
     }
 
     /// Information of the record on θ at the network's estimate; `None` where the features do not tell it.

@@ -4,6 +4,7 @@ use super::*;
 use crate::estimator::estimate::EstimateOptions;
 use crate::estimator::pretrain::{PretrainOptions, pretrain};
 use crate::study::{RecordPlan, Study, StudyFile};
+use crate::twin::Twin;
 use crate::twins::CascadedTanks;
 
 /// The tanks, all physical parameters fixed.
