@@ -125,9 +125,19 @@ fn unnamed(units: &Units, diagnosis: &Diagnosis) -> String {
             "most likely at",
         ),
     };
-    let places = somewhere(units, &diagnosis.location).into_iter().flatten();
-    let placed = places.map(|place| format!("{what}; {at} {place}."));
-    short_enough(placed.chain([format!("{what}.")]))
+    let Some([named, counted]) = somewhere(units, &diagnosis.location) else {
+        return format!("{what}.");
+    };
+    let lead = what.split(':').next().unwrap_or(gap);
+    short_enough([
+        format!("{what}; {at} {named}."),
+        format!("{what}; {at} {counted}."),
+        format!("{lead}, {at} {counted}."),
+        format!(
+            "{lead}, {at} {}.",
+            diagnosis.location.target.as_deref().unwrap_or("")
+        ),
+    ])
 }
 
 /// A gap with names: those that are known, then rivals, then what remains.
