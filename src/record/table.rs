@@ -68,11 +68,14 @@ impl Table {
             )));
         }
         let header: Vec<&str> = header.iter().collect();
+        if columns.is_empty() {
+            check_header(&header).map_err(|problem| RecordError::file(path, problem))?;
+        }
         let usual = columns.usual_names(&header, signals);
         let (usual, inputs, outputs) = usual
             .and_then(|usual| {
                 let names: Vec<&str> = usual.iter().flatten().map(String::as_str).collect();
-                let (inputs, outputs) = channels(&names, columns)?;
+                let (inputs, outputs) = channels(&names)?;
                 Ok((usual, inputs, outputs))
             })
             .map_err(|problem| RecordError::Columns {
@@ -267,18 +270,22 @@ fn csv_error(path: &Path, separator: u8, error: csv::Error) -> RecordError {
     RecordError::file(path, format!("{problem}; {remedy}"))
 }
 
-/// Number of inputs and outputs that a header names: each of t, u…, y… once and without gaps.
-fn channels(names: &[&str], columns: &Columns) -> Result<(usize, usize), String> {
-    if columns.is_empty() && names.iter().all(|name| name.is_empty()) {
-        return Err("the file is empty; a record needs a header t,u,y and rows".into());
+/// Checks that a file begins with names of columns.
+fn check_header(names: &[&str]) -> Result<(), &'static str> {
+    if names.iter().all(|name| name.is_empty()) {
+        return Err("the file is empty; a record needs a header t,u,y and rows");
     }
     let is_number = |name: &&str| name.replacen(',', ".", 1).parse::<f64>().is_ok();
-    if columns.is_empty() && names.iter().all(is_number) {
-        return Err(
-            "row 1 holds numbers, not the names of the columns; add a first row such as t,u,y"
-                .into(),
-        );
+    match names.iter().all(is_number) {
+        true => {
+            Err("row 1 holds numbers, not the names of the columns; add a first row such as t,u,y")
+        }
+        false => Ok(()),
     }
+}
+
+/// Number of inputs and outputs that a header names: each of t, u…, y… once and without gaps.
+fn channels(names: &[&str]) -> Result<(usize, usize), String> {
     let count = |letter: char| names.iter().filter(|n| n.starts_with(letter)).count();
     let (inputs, outputs) = (count('u'), count('y'));
     let mut expected = vec!["t".to_owned()];
