@@ -11,6 +11,7 @@ mod agreement;
 #[path = "../browser/mod.rs"]
 mod browser;
 mod fits;
+mod golden;
 mod records;
 #[path = "../../examples/rigs.rs"]
 #[allow(dead_code, unreachable_pub)]
@@ -41,6 +42,7 @@ fn main() {
     ];
     let records = trials![are_records;
         agreement::fits_and_diagnoses_of_rigs_weigh_effects_alike,
+        golden::golden_answers_of_rigs_stay,
         fits::the_overflow_of_real_tanks_is_found_by_fits,
         fits::the_carriage_shows_its_friction,
         fits::the_heater_shows_its_lag,

@@ -37,7 +37,7 @@ pub fn measured(name: &str) -> Record {
 }
 
 /// The study of the real tanks.
-fn tanks() -> Study {
+pub fn tanks() -> Study {
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cascaded-tanks.toml");
     let file = StudyFile::read(&example).unwrap();
     let twins = reference_studies().unwrap();

@@ -4,7 +4,7 @@
 mod common;
 #[path = "../../examples/rooms.rs"]
 #[allow(dead_code, unreachable_pub, clippy::duplicate_mod)]
-mod rooms;
+pub(crate) mod rooms;
 
 use common::{compared, differing, simulated};
 use truetwin::evaluate::paper::reference_studies;

@@ -15,6 +15,7 @@ mod effects;
 mod estimator;
 mod filter;
 mod fit;
+mod golden;
 mod misspecification;
 mod numbers;
 mod suitability;
