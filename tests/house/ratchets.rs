@@ -278,22 +278,22 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 151, items.collect()),
         Ratchet::new("error types", 13, errors),
-        Ratchet::new("lines of code", 50_300, lines),
-        Ratchet::new("files", 502, files.collect()),
+        Ratchet::new("lines of code", 49_900, lines),
+        Ratchet::new("files", 480, files.collect()),
         Ratchet::new("hidden items", 22, hidden(sources)),
         Ratchet::new("methods of StateSpace", 26, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 545, constants(sources)),
+        Ratchet::new("named numeric constants", 450, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
-            20,
+            7,
             wide_functions(sources, 6),
         ),
         Ratchet::new(
             "functions of more than 100 lines",
-            6,
+            2,
             long_functions(sources, 100),
         ),
-        Ratchet::new("further types of one name", 80, repeated_types(sources)),
+        Ratchet::new("further types of one name", 50, repeated_types(sources)),
         Ratchet::new(
             "library messages with words of the command line",
             10,
