@@ -10,7 +10,7 @@
 //! | `budget.rs` | cost and tolerances of a fit |
 //! | `starts.rs`, `spectral.rs`, `growing.rs` | where does a search begin |
 //! | `solver.rs` | the one solver, on argmin |
-//! | `climb.rs`, `slope.rs` | the most probable θ |
+//! | `climb.rs` | the most probable θ |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `passes.rs` | what a search costs |
 //! | `evidence.rs` | the likelihood averaged over the prior |
@@ -36,7 +36,6 @@ pub(crate) mod reference;
 mod run;
 mod score;
 mod searched;
-mod slope;
 mod solver;
 mod spectral;
 pub(crate) mod starts;

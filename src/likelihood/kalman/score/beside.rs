@@ -3,12 +3,12 @@
 //! Each number of the recursion is eight numbers ([`Lanes`]), one for each θ, which the processor handles together. The twin's equations stay
 //! plain f64 and are called for one lane after the other.
 
-use super::number::MOST_STATES;
-use super::order::Order;
-use super::pass::{FilterJob, Innovation, Pass, Sink};
-use super::size::{Size, with_size};
-use super::update::Readings;
-use super::{Kalman, Method};
+use crate::likelihood::kalman::number::MOST_STATES;
+use crate::likelihood::kalman::order::Order;
+use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
+use crate::likelihood::kalman::size::{Size, with_size};
+use crate::likelihood::kalman::update::Readings;
+use crate::likelihood::kalman::{Kalman, Method};
 use crate::math::{Kernel, LANES, Lanes, widest};
 
 /// Innovation and its variance, row by row; 0 and 1 where the output is missing.

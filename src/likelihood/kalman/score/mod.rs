@@ -1,10 +1,12 @@
 //! The gradient of the log-likelihood.
 
-use super::beside::{Together, together};
+mod beside;
+
 use super::order::Order;
 use super::pass::{Innovation, Sink};
 use super::{Coordinates, FilterError, Kalman};
 use crate::math::{LANES, Stencil};
+use beside::{Together, together};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 /// Gradient of the log-likelihood in the [`Coordinates`] φ, by central differences (one-sided at a bound); d parameters, N samples.
