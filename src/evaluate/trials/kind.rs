@@ -24,6 +24,19 @@ pub enum Kind {
     Beside,
 }
 
+/// Names in calls and files, numbers of trials among twenty, right answers; in the order of the kinds.
+#[rustfmt::skip] // One row a kind.
+const TABLE: [(Kind, &str, usize, &str); 7] = [
+    (Kind::None, "none", 4, "no structural gap"),
+    (Kind::Outside, "outside", 3, "no structural gap; a parameter gap may be seen"),
+    (Kind::Listed, "listed", 4, NAMED),
+    (Kind::Otherwise, "otherwise", 2, NAMED),
+    (Kind::Random, "random", 4, "structural, none of the listed effects"),
+    (Kind::Pair, "pair", 1, "structural, both effects and nothing false accepted"),
+    (Kind::Beside, "beside", 2, NAMED),
+];
+const NAMED: &str = "structural, the true effect and nothing false accepted";
+
 impl Kind {
     /// All, in the order of tables.
     pub const ALL: [Self; 7] = [
@@ -38,20 +51,17 @@ impl Kind {
 
     /// As in calls and files.
     pub fn id(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Outside => "outside",
-            Self::Listed => "listed",
-            Self::Otherwise => "otherwise",
-            Self::Random => "random",
-            Self::Pair => "pair",
-            Self::Beside => "beside",
-        }
+        TABLE[self as usize].1
     }
 
     /// The kind with this id.
     pub fn named(id: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.id() == id)
+    }
+
+    /// The right answer, in words.
+    pub(crate) fn rule(self) -> &'static str {
+        TABLE[self as usize].3
     }
 
     /// Returns true if no θ explains the record.
@@ -66,12 +76,7 @@ impl Kind {
 
     /// Number of trials of this kind among twenty.
     fn weight(self) -> usize {
-        match self {
-            Self::None | Self::Listed | Self::Random => 4,
-            Self::Outside => 3,
-            Self::Otherwise | Self::Beside => 2,
-            Self::Pair => 1,
-        }
+        TABLE[self as usize].2
     }
 }
 
@@ -111,6 +116,7 @@ mod tests {
             let count = assigned.iter().filter(|k| **k == kind).count();
             assert_eq!(count, 2 * kind.weight(), "{kind}");
             assert_eq!(Kind::named(kind.id()), Some(kind));
+            assert_eq!(TABLE[kind as usize].0, kind);
         }
         assert_eq!(assign_kinds(&[Kind::Pair], 3, |_| 0), [Kind::Pair; 3]);
         assert!(assign_kinds(&[], 3, |_| 0).is_empty());

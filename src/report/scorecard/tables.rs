@@ -100,6 +100,7 @@ fn cells(breakdown: &Breakdown, line: &BreakdownLine, labels: usize) -> Vec<Stri
         Value::String(text) => text.clone(),
         number => number.as_f64().map_or("–".into(), |v| format!("{v:.2}")),
     };
+    let rule = |kind: &str| Kind::named(kind).map_or("–", Kind::rule).to_owned();
     let trials = line
         .counts
         .first()
@@ -107,7 +108,7 @@ fn cells(breakdown: &Breakdown, line: &BreakdownLine, labels: usize) -> Vec<Stri
         .flatten()
         .filter(|_| labels == 3);
     let mut cells = match breakdown.key {
-        "by_kind" => vec![text("kind"), rule(&text("kind")).into()],
+        "by_kind" => vec![text("kind"), rule(&text("kind"))],
         "by_nuisance" => vec![text("nuisance")],
         "reliability" => vec![text("stated")],
         "steadiness" => vec![text("change")],
@@ -199,18 +200,5 @@ pub(super) fn nats(line: &BreakdownLine) -> String {
     match line.label("high").as_f64() {
         Some(high) => format!("{low:.0} … {high:.0} nats"),
         None => format!("above {low:.0} nats"),
-    }
-}
-
-/// Returns the rule of a right answer.
-fn rule(kind: &str) -> &'static str {
-    match Kind::named(kind) {
-        Some(Kind::Outside) => "no structural gap; a parameter gap may be seen",
-        Some(Kind::Listed | Kind::Otherwise | Kind::Beside) => {
-            "structural, the true effect and nothing false accepted"
-        }
-        Some(Kind::Random) => "structural, none of the listed effects",
-        Some(Kind::Pair) => "structural, both effects and nothing false accepted",
-        Some(Kind::None) | None => "no structural gap",
     }
 }
