@@ -12,7 +12,7 @@ use truetwin::likelihood::kalman::{
     Coordinates, FilterError, FilterSettings, Kalman, Method, Score,
 };
 use truetwin::record::{Drive, Record, Signal};
-use truetwin::twin::{DigitalTwin, Interval, Noise, Now, Outline, Parameter, StateSpace};
+use truetwin::twin::{Composed, DigitalTwin, Interval, Noise, Now, Outline, Parameter, StateSpace};
 use truetwin::twins::{CascadedTanks, VanDerPol};
 
 const TANKS: [f64; 4] = [0.6, 0.5, 0.55, 1.0];
@@ -59,8 +59,8 @@ fn levels(rows: usize) -> Drive {
     Drive::new(0.5, levels).expect("the step is positive")
 }
 
-fn simulated(twin: &dyn StateSpace, theta: &[f64], drive: &Drive, run: u64) -> Record {
-    let outputs = twin.run(theta, drive, Noise::new(1, "bench", run));
+fn simulated(twin: &dyn DigitalTwin, theta: &[f64], drive: &Drive, run: u64) -> Record {
+    let outputs = twin.simulate(theta, drive, Noise::new(1, "bench", run));
     Record::new(drive.clone(), outputs.expect("it is stable")).expect("the outputs are finite")
 }
 
@@ -83,7 +83,8 @@ fn ratios(clock: &Clock) {
     }
     let (settings, drive) = (FilterSettings::default(), levels(400));
     let record = simulated(&CascadedTanks, &TANKS, &drive, 0);
-    let kalman = Kalman::new(&CascadedTanks, &record, &settings).expect("it fits");
+    let twin = Composed::from(CascadedTanks);
+    let kalman = Kalman::new(&twin, &record, &settings).expect("it fits");
     let coordinates = Coordinates::new(kalman.parameters());
     let score = |of: fn(&Kalman<'_>, &[f64], &Coordinates) -> Result<Score, FilterError>| {
         assert!(black_box(of(&kalman, black_box(&TANKS), &coordinates)).is_ok());
@@ -92,7 +93,7 @@ fn ratios(clock: &Clock) {
         .map(|run| simulated(&CascadedTanks, &TANKS, &drive, run))
         .collect();
     let kalmans: Vec<Kalman<'_>> = (eight.iter())
-        .map(|record| Kalman::new(&CascadedTanks, record, &settings).expect("it fits"))
+        .map(|record| Kalman::new(&twin, record, &settings).expect("it fits"))
         .collect();
     let [before, now, of_eight] = in_turn([
         &mut || score(Score::forward_one_by_one),
@@ -134,7 +135,7 @@ fn ratios(clock: &Clock) {
         let (twin, drive) = (Chain(n), levels(200));
         let theta: Vec<f64> = (0..n).map(|i| 0.5 + 0.02 * i as f64).collect();
         let record = simulated(&twin, &theta, &drive, 0);
-        let kalman = Kalman::new(&twin, &record, &settings).expect("it fits");
+        let kalman = Kalman::new(twin, &record, &settings).expect("it fits");
         let [pass] = in_turn([&mut || drop(black_box(kalman.log_likelihood(black_box(&theta))))]);
         println!("filter: ratios, chain of {n} tanks, 200 rows: {pass:.1} µs");
     }
@@ -145,9 +146,14 @@ pub fn run(clock: &Clock) {
     let levels = Signal::from_shape_fn((400, 1), |(k, _)| ((k / 30) * 7 % 5) as f64 * 0.6);
     let forced = Drive::new(0.5, levels).expect("the step is positive");
     let free = Drive::autonomous(0.05, 300).expect("the step is positive");
-    let cases: [(&str, &dyn StateSpace, Drive, &[f64]); 2] = [
-        ("tanks", &CascadedTanks, forced, &[0.6, 0.5, 0.55, 1.0]),
-        ("van der Pol", &VanDerPol, free, &[3.0]),
+    let cases: [(&str, Composed, Drive, &[f64]); 2] = [
+        (
+            "tanks",
+            CascadedTanks.into(),
+            forced,
+            &[0.6, 0.5, 0.55, 1.0],
+        ),
+        ("van der Pol", VanDerPol.into(), free, &[3.0]),
     ];
     for (name, twin, drive, theta) in cases {
         let outputs =
@@ -155,7 +161,7 @@ pub fn run(clock: &Clock) {
         let record = Record::new(drive, outputs).expect("the outputs are finite");
         for method in [Method::Points, Method::Extended] {
             let settings = FilterSettings::default().with_method(method);
-            let kalman = Kalman::new(twin, &record, &settings).expect("the channels agree");
+            let kalman = Kalman::new(&twin, &record, &settings).expect("the channels agree");
             let name = |part: &str| format!("filter: {name}, {method:?}, {part}");
             clock.time(&name("log-likelihood"), 1, || {
                 kalman.log_likelihood(black_box(theta))

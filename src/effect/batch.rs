@@ -1,84 +1,56 @@
 //! Laws over several points at once: one call, and what depends on the magnitudes alone is computed once.
 
 use super::law::{ForcePoint, Instant};
-use crate::twin::Layout;
-use std::ops::Range;
-use std::sync::Arc;
-
-/// A channel of the outputs of several points, and the memory of its effect in their states.
-#[derive(Debug, Clone)]
-pub(super) struct Channel {
-    /// Memory values in the state.
-    pub memory: Range<usize>,
-    /// Index of the channel.
-    pub target: usize,
-}
+use crate::twin::{
+    Layout, Now, OutputChannel, ParameterChange, RateChange, SignalChange, StateLimit, StatePair,
+};
 
 /// Memories that a look at a signal copies without the heap.
 const SHORT: usize = 8;
 
-/// A sensor's law over the points of a filter.
-pub(super) trait SensorBatch: Send + Sync {
-    /// Passes the channel of points, `p` outputs each, through the effect; advances its memory in the states.
-    fn pass(
-        &self,
-        m: &[f64],
-        now: Instant,
-        on: &Channel,
-        states: (Layout, &mut [f64]),
-        outputs: (usize, &mut [f64]),
-    );
-
-    /// As [`pass`](Self::pass), the memories left as they are.
-    fn peek(
-        &self,
-        m: &[f64],
-        now: Instant,
-        on: &Channel,
-        states: (Layout, &[f64]),
-        outputs: (usize, &mut [f64]),
-    );
-
-    /// As [`pass`](Self::pass) of a law without memory, also without states; returns whether any output changed.
-    fn read(&self, m: &[f64], now: Instant, target: usize, outputs: (usize, &mut [f64])) -> bool;
+fn instant(now: &Now<'_>) -> Instant {
+    Instant {
+        t: now.t,
+        dt: now.dt,
+    }
 }
 
-impl<F> SensorBatch for F
+impl<F> SignalChange for F
 where
     F: Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync,
 {
     fn pass(
         &self,
         m: &[f64],
-        now: Instant,
-        on: &Channel,
+        now: &Now<'_>,
+        on: &OutputChannel,
         (at, x): (Layout, &mut [f64]),
         (p, y): (usize, &mut [f64]),
     ) {
         let (memory, target) = (on.memory.clone(), on.target);
         for (x, y) in at.each_mut(x).zip(y.chunks_exact_mut(p)) {
-            y[target] = self(m, now, &mut x[memory.clone()], y[target]);
+            y[target] = self(m, instant(now), &mut x[memory.clone()], y[target]);
         }
     }
 
     fn peek(
         &self,
         m: &[f64],
-        now: Instant,
-        on: &Channel,
+        now: &Now<'_>,
+        on: &OutputChannel,
         (at, x): (Layout, &[f64]),
         (p, y): (usize, &mut [f64]),
     ) {
-        let (memory, target) = (on.memory.clone(), on.target);
-        let points = at.each(x).zip(y.chunks_exact_mut(p));
+        let (memory, target, now) = (on.memory.clone(), on.target, instant(now));
+        let outputs = y.chunks_exact_mut(p);
         match memory.len() {
             0 => {
-                for (_, y) in points {
+                for y in outputs {
                     y[target] = self(m, now, &mut [], y[target]);
                 }
             }
             1 => {
-                for (x, y) in points {
+                for (x, y) in at.each(x).zip(outputs) {
                     y[target] = self(m, now, &mut [x[memory.start]], y[target]);
                 }
             }
@@ -91,98 +63,53 @@ where
                         &mut many[..]
                     }
                 };
-                for (x, y) in points {
+                for (x, y) in at.each(x).zip(outputs) {
                     copy.copy_from_slice(&x[memory.clone()]);
                     y[target] = self(m, now, copy, y[target]);
                 }
             }
         }
     }
-
-    fn read(&self, m: &[f64], now: Instant, target: usize, (p, y): (usize, &mut [f64])) -> bool {
-        let mut changed = false;
-        for y in y.chunks_exact_mut(p) {
-            let before = y[target];
-            y[target] = self(m, now, &mut [], before);
-            changed |= y[target].to_bits() != before.to_bits();
-        }
-        changed
-    }
 }
 
-/// Form of a law over several points; none for laws that are asked once a sample.
-#[derive(Clone)]
-pub(super) enum Batch {
-    None,
-    Sensor(Arc<dyn SensorBatch>),
-    Force(Arc<dyn ForceBatch>),
-    Limit(Arc<dyn LimitBatch>),
-}
-
-/// Target and other state of a law on states.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pair {
-    /// Index of the target.
-    pub target: usize,
-    /// Index of the other state.
-    pub other: Option<usize>,
-}
-
-/// A force law over the points of a filter.
-pub(super) trait ForceBatch: Send + Sync {
-    /// Adds the force to the rates of points; `point` holds what is the same for all of them.
-    fn push(
-        &self,
-        m: &[f64],
-        on: Pair,
-        point: &ForcePoint<'_>,
-        at: Layout,
-        x: &[f64],
-        dx: &mut [f64],
-    );
-}
-
-impl<F> ForceBatch for F
+impl<F> RateChange for F
 where
     F: Fn(&[f64], &ForcePoint<'_>) -> f64 + Send + Sync,
 {
-    fn push(
-        &self,
-        m: &[f64],
-        on: Pair,
-        point: &ForcePoint<'_>,
-        at: Layout,
-        x: &[f64],
-        dx: &mut [f64],
-    ) {
+    fn push(&self, m: &[f64], now: &Now<'_>, on: StatePair, at: Layout, x: &[f64], dx: &mut [f64]) {
         for (states, rates) in at.each(x).zip(at.each_mut(dx)) {
             let point = ForcePoint {
                 x: states[on.target],
                 other: on.other.map_or(0.0, |j| states[j]),
+                t: now.t,
                 states,
-                ..*point
+                u: now.u,
+                theta: now.theta,
             };
             rates[on.target] += self(m, &point);
         }
     }
 }
 
-/// A limit law over the points of a filter.
-pub(super) trait LimitBatch: Send + Sync {
-    /// Bends the target and the other state of points.
-    fn hold(&self, m: &[f64], on: Pair, at: Layout, x: &mut [f64]);
-}
-
-impl<F> LimitBatch for F
+impl<F> StateLimit for F
 where
     F: Fn(&[f64], &mut f64, Option<&mut f64>) + Send + Sync,
 {
-    fn hold(&self, m: &[f64], on: Pair, at: Layout, x: &mut [f64]) {
+    fn hold(&self, m: &[f64], on: StatePair, at: Layout, x: &mut [f64]) {
         let other = on.other.filter(|j| *j != on.target);
         for x in at.each_mut(x) {
             let mut value = x[on.target];
             self(m, &mut value, other.map(|j| &mut x[j]));
             x[on.target] = value;
         }
+    }
+}
+
+impl<F> ParameterChange for F
+where
+    F: Fn(&[f64], f64, f64) -> f64 + Send + Sync,
+{
+    fn value(&self, m: &[f64], now: &Now<'_>, _: &[f64], value: f64) -> f64 {
+        self(m, now.t, value)
     }
 }

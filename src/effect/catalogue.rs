@@ -5,7 +5,7 @@ use super::key::EffectPattern;
 use super::kind::{EffectKind, OtherState};
 use super::library;
 use super::placed::{Effect, EffectEntry};
-use crate::twin::{Outline, ParameterSpace, Role, StateSpace, Twin, TwinError, is_memory};
+use crate::twin::{Composed, Outline, ParameterSpace, Role, Twin, TwinError, is_memory};
 use std::sync::{Arc, LazyLock};
 
 static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
@@ -110,7 +110,7 @@ fn own(mut outline: Outline) -> Outline {
 }
 
 /// Pairs (rate, of) of states by name.
-fn rates(twin: &dyn StateSpace) -> Vec<(String, String)> {
+fn rates(twin: &Composed) -> Vec<(String, String)> {
     let states = twin.outline().states;
     let name = |i: usize| states[i].name.clone();
     (crate::twin::rates(twin).into_iter())

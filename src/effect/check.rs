@@ -84,7 +84,7 @@ fn check_place(
     }
     // A twin of a single state has no other one: there, what a limit takes is lost.
     let alone = known.iter().filter(|name| !is_memory(name)).count() == 1;
-    let lost = matches!(law, Law::Limit) && alone;
+    let lost = matches!(law, Law::Limit(_)) && alone;
     if effect.other() == Some(effect.target()) && !lost {
         let target = effect.target().to_owned();
         return Err(TwinError::EffectOnItself { id, target });

@@ -1,6 +1,5 @@
 //! One row of the library: id, law, magnitudes.
 
-use super::batch::Batch;
 use super::law::{ForcePoint, Instant, Law};
 use super::magnitude::Magnitude;
 use super::marks::Mark;
@@ -53,7 +52,6 @@ pub struct EffectKind {
     formula: String,
     sentence: Option<String>,
     law: Law,
-    batch: Batch,
     magnitudes: Vec<Magnitude>,
     other: Option<OtherState>,
     only_on: Option<Vec<String>>,
@@ -71,8 +69,7 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
     ) -> Self {
-        let law = Arc::new(law);
-        Self::new(id, formula, Law::Sensor(law.clone())).batch(Batch::Sensor(law))
+        Self::new(id, formula, Law::Sensor(Arc::new(law)))
     }
 
     /// Creates an effect that changes an input: `law(m, now, memory, u)` returns the signal that acts.
@@ -90,7 +87,7 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], &ForcePoint<'_>) -> f64 + Send + Sync + 'static,
     ) -> Self {
-        Self::new(id, formula, Law::Force).batch(Batch::Force(Arc::new(law)))
+        Self::new(id, formula, Law::Force(Arc::new(law)))
     }
 
     /// Creates an effect on a state after each step: `law(m, x, other)` changes both.
@@ -99,7 +96,7 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], &mut f64, Option<&mut f64>) + Send + Sync + 'static,
     ) -> Self {
-        Self::new(id, formula, Law::Limit).batch(Batch::Limit(Arc::new(law)))
+        Self::new(id, formula, Law::Limit(Arc::new(law)))
     }
 
     /// Creates an effect on a parameter: `law(m, t, value)` returns its value at time t.
@@ -153,7 +150,6 @@ impl EffectKind {
             formula: formula.into(),
             sentence: None,
             law,
-            batch: Batch::None,
             magnitudes: vec![],
             other: None,
             only_on: None,
@@ -163,11 +159,6 @@ impl EffectKind {
             mark: None,
             check: None,
         }
-    }
-
-    fn batch(mut self, batch: Batch) -> Self {
-        self.batch = batch;
-        self
     }
 
     /// Adds a magnitude, behind those before it.
@@ -253,11 +244,6 @@ impl EffectKind {
     /// Returns the law.
     pub(crate) fn law(&self) -> &Law {
         &self.law
-    }
-
-    /// Returns the form of the law over several points.
-    pub(super) fn over_points(&self) -> &Batch {
-        &self.batch
     }
 
     /// Returns the magnitudes in the order of θ.

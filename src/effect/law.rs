@@ -1,6 +1,6 @@
 //! The law of an effect: a function of the twin's signals, states, parameters or noise.
 
-use crate::twin::Outliers;
+use crate::twin::{NoiseLaw, OutlierLaw, ParameterChange, RateChange, SignalChange, StateLimit};
 use std::fmt;
 use std::sync::Arc;
 
@@ -33,31 +33,21 @@ pub struct ForcePoint<'a> {
     pub theta: &'a [f64],
 }
 
-/// A signal after the effect, from magnitudes, time, memory and the signal before it. The memory may change, once a sample.
-pub(crate) type SignalLaw = dyn Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync;
-/// A parameter at a time, from magnitudes, time and the value without the effect.
-pub(crate) type ParameterLaw = dyn Fn(&[f64], f64, f64) -> f64 + Send + Sync;
-/// A standard deviation that joins the twin's own in quadrature, or a step of rounding.
-pub(crate) type NoiseLaw = dyn Fn(&[f64]) -> f64 + Send + Sync;
-/// Frequency and size of rare large errors.
-pub(crate) type OutlierLaw = dyn Fn(&[f64]) -> Outliers + Send + Sync;
-
-/// The law of an effect, with its function, whose first argument holds the magnitudes. Forces and limits are called over several
-/// points ([`Batch`](super::batch::Batch)).
+/// The law of an effect: a function of its magnitudes and of what it bends, over several points at once.
 #[derive(Clone)]
 #[non_exhaustive]
-pub enum Law {
+pub(crate) enum Law {
     /// An output signal.
-    Sensor(Arc<SignalLaw>),
+    Sensor(Arc<dyn SignalChange>),
     /// An input signal.
-    Actuator(Arc<SignalLaw>),
+    Actuator(Arc<dyn SignalChange>),
     /// The rate of a state.
-    Force,
+    Force(Arc<dyn RateChange>),
     /// A limit on a state, after each step.
-    Limit,
+    Limit(Arc<dyn StateLimit>),
     /// A parameter over time.
-    Parameter(Arc<ParameterLaw>),
-    /// The noise of an output.
+    Parameter(Arc<dyn ParameterChange>),
+    /// The noise of an output: a standard deviation that joins the twin's own in quadrature.
     MeasurementNoise(Arc<NoiseLaw>),
     /// The noise of a state.
     ProcessNoise(Arc<NoiseLaw>),
@@ -75,7 +65,7 @@ impl Law {
                 TargetKind::Sensor
             }
             Self::Actuator(_) => TargetKind::Actuator,
-            Self::Force | Self::Limit | Self::ProcessNoise(_) => TargetKind::State,
+            Self::Force(_) | Self::Limit(_) | Self::ProcessNoise(_) => TargetKind::State,
             Self::Parameter(_) => TargetKind::Parameter,
         }
     }
@@ -94,8 +84,8 @@ impl fmt::Debug for Law {
         f.write_str(match self {
             Self::Sensor(_) => "Sensor",
             Self::Actuator(_) => "Actuator",
-            Self::Force => "Force",
-            Self::Limit => "Limit",
+            Self::Force(_) => "Force",
+            Self::Limit(_) => "Limit",
             Self::Parameter(_) => "Parameter",
             Self::MeasurementNoise(_) => "MeasurementNoise",
             Self::ProcessNoise(_) => "ProcessNoise",

@@ -4,7 +4,7 @@ use super::{FeatureError, FeatureMap, FeatureRecipe, check_long, check_varies};
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score as Gradient};
 use crate::math::LANES;
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{ParameterSpace, StateSpace, Twin};
+use crate::twin::{Composed, ParameterSpace, Twin};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -51,7 +51,7 @@ impl FeatureRecipe for Score {
 /// Score features at one reference.
 #[derive(Clone)]
 struct ScoreMap {
-    equations: Arc<dyn StateSpace>,
+    equations: Composed,
     space: ParameterSpace,
     coordinates: Coordinates,
     filter: FilterSettings,
@@ -85,7 +85,7 @@ impl FeatureMap for ScoreMap {
 
     fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
         let record = self.record(drive, outputs)?;
-        let kalman = Kalman::new(self.equations.as_ref(), &record, &self.filter)?;
+        let kalman = Kalman::new(&self.equations, &record, &self.filter)?;
         let score = Gradient::forward(&kalman, &self.reference, &self.coordinates)?;
         self.features(&record, &score)
     }
@@ -95,7 +95,7 @@ impl FeatureMap for ScoreMap {
             .map(|(drive, outputs)| self.record(drive, outputs))
             .collect();
         let kalmans: Result<Vec<Kalman<'_>>, _> = (records.iter().flatten())
-            .map(|record| Kalman::new(self.equations.as_ref(), record, &self.filter))
+            .map(|record| Kalman::new(&self.equations, record, &self.filter))
             .collect();
         let Ok(kalmans) = kalmans else {
             let each = |(drive, outputs): &(&Drive, &Signal)| self.extract(drive, outputs);

@@ -102,7 +102,7 @@ fn eigenvalues(twin: &Twin, theta: &[f64], record: &Record) -> Option<Vec<Comple
     let twin = twin.equations()?;
     let n = twin.outline().states.len();
     let acting = Acting::of(twin, theta, record.drive()).ok()?;
-    let now = acting.at(0, theta);
+    let now = acting.at(0);
     let (mut x, mut rates) = (vec![0.0; n], vec![0.0; n]);
     twin.start(&now, &mut x);
     twin.drift(&now, &x, &mut rates);

@@ -16,10 +16,6 @@
 
 mod alike;
 pub(crate) mod basis;
-pub(crate) mod disturbed_equations;
-mod disturbed_signals;
-mod entered;
-mod entered_black_box;
 pub(crate) mod entry;
 pub(crate) mod functions;
 pub(crate) mod listed;

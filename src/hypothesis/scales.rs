@@ -142,7 +142,7 @@ fn each_moment(
         };
         let count = moments.min(record.samples());
         for k in (0..count).map(|m| m * record.samples() / count) {
-            let (now, x) = (acting.at(k, theta), states.row(k).to_vec());
+            let (now, x) = (acting.at(k), states.row(k).to_vec());
             twin.drift(&now, &x, &mut rates);
             twin.observe(&now, &x, &mut outputs);
             then(&rates, &outputs);

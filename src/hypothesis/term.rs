@@ -1,9 +1,6 @@
 //! One hypothesis of what a twin lacks: a term that is added to it.
 
-use super::disturbed_equations::disturbed;
-use super::entered::with_function;
-use super::entry::{Entered, Entry};
-use super::{disturbed_signals, entered_black_box};
+use super::entry::{Entered, Entry, disturbed, with_function};
 use crate::effect::{Effect, EffectKey, Magnitude, Shape, augment_late};
 use crate::fit::axis::Axis;
 use crate::likelihood::kalman::FilterError;
@@ -197,17 +194,10 @@ pub(crate) fn with_terms<'t>(
         }
     }
     let twin = fix(augment_late(base.clone(), effects)?, &off)?;
-    Ok(terms.fold(twin, |twin, term| match (&term.part, twin) {
-        (Part::Effect { .. }, twin) => twin,
-        (part, Twin::BlackBox(twin)) => match *part {
-            Part::Function(function) => entered_black_box::with_function(twin, function),
-            Part::Disturbance { entry, memory } => {
-                disturbed_signals::disturbed(twin, entry, memory)
-            }
-            Part::Effect { .. } => twin.into(),
-        },
-        (&Part::Disturbance { entry, memory }, twin) => disturbed(twin, entry, memory),
-        (&Part::Function(function), twin) => with_function(twin, function),
+    Ok(terms.fold(twin, |twin, term| match term.part {
+        Part::Effect { .. } => twin,
+        Part::Disturbance { entry, memory } => disturbed(&twin, entry, memory),
+        Part::Function(function) => with_function(&twin, function),
     }))
 }
 

@@ -3,7 +3,7 @@
 use super::ensemble;
 use super::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score, States};
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Outline, StateSpace, Twin};
+use crate::twin::{Composed, ComposedBlackBox, DigitalTwin, Outline, Twin};
 use std::sync::Arc;
 
 /// Likelihood of a record at θ.
@@ -45,7 +45,7 @@ pub(crate) fn likelihood_of(twin: &Twin) -> Arc<dyn Likelihood> {
     }
 }
 
-struct FilterLikelihood(Arc<dyn StateSpace>, FilterSettings);
+struct FilterLikelihood(Composed, FilterSettings);
 
 impl FilterLikelihood {
     fn kalman<'a>(
@@ -53,7 +53,7 @@ impl FilterLikelihood {
         record: &'a Record,
         settings: &'a FilterSettings,
     ) -> Result<Kalman<'a>, FilterError> {
-        Ok(Kalman::new(self.0.as_ref(), record, settings)?.of_cells())
+        Ok(Kalman::new(&self.0, record, settings)?.of_cells())
     }
 }
 
@@ -101,7 +101,7 @@ impl Likelihood for FilterLikelihood {
     }
 }
 
-struct EnsembleLikelihood(Arc<dyn DigitalTwin>);
+struct EnsembleLikelihood(ComposedBlackBox);
 
 impl Likelihood for EnsembleLikelihood {
     /// The predicted outputs stand for states.
@@ -115,7 +115,7 @@ impl Likelihood for EnsembleLikelihood {
         }
     }
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError> {
-        ensemble::filtered(self.0.as_ref(), theta, record)
+        ensemble::filtered(&self.0, theta, record)
     }
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError> {
         let filtered = self.filtered(theta, record)?;

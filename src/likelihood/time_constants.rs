@@ -34,7 +34,7 @@ pub(crate) fn time_constants(
     let acting = Acting::of(equations, theta, drive).ok()?;
     let (mut fastest, mut slowest) = (vec![], vec![]);
     for k in (0..states.nrows()).step_by(states.nrows().div_ceil(POINTS).max(1)) {
-        let now = acting.at(k, theta);
+        let now = acting.at(k);
         let stencil = Stencil::new(&states.row(k).to_vec(), &sizes, &beginless, &endless).ok()?;
         let drift = |x: &[f64]| {
             let mut drift = DVector::zeros(x.len());

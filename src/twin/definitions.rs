@@ -1,13 +1,13 @@
 //! States whose rate another state is by definition.
 
-use super::{Noise, Now, StateSpace};
+use super::{Composed, Noise, Now};
 
 /// Points at which equations are compared: a definition holds at any.
 const POINTS: u64 = 5;
 
 /// Finds pairs (rate, of): the rate of the second state is the first one at every one of a few random points, as of a
 /// position and its velocity.
-pub(crate) fn rates(twin: &dyn StateSpace) -> Vec<(usize, usize)> {
+pub(crate) fn rates(twin: &Composed) -> Vec<(usize, usize)> {
     let (outline, limits) = (twin.outline(), twin.limits());
     let n = outline.states.len();
     let mut pairs: Vec<(usize, usize)> = (0..n)
@@ -34,7 +34,7 @@ pub(crate) fn rates(twin: &dyn StateSpace) -> Vec<(usize, usize)> {
 }
 
 /// Returns for each state whether its rate is another state, whatever θ, inputs and time: no law can be missing there.
-pub(super) fn defined_states(twin: &dyn StateSpace) -> Vec<bool> {
+pub(super) fn defined_states(twin: &Composed) -> Vec<bool> {
     let mut defined = vec![false; twin.outline().states.len()];
     for (_, of) in rates(twin) {
         defined[of] = true;
@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn a_position_is_defined_by_its_velocity_and_a_level_is_not() {
-        assert_eq!(defined_states(&VanDerPol), [true, false]);
-        assert_eq!(defined_states(&CascadedTanks), [false, false]);
+        assert_eq!(defined_states(&VanDerPol.into()), [true, false]);
+        assert_eq!(defined_states(&CascadedTanks.into()), [false, false]);
     }
 }

@@ -1,14 +1,7 @@
 //! A twin with some parameters held at known values.
 
-use super::simulation::check_length;
-use crate::record::{Drive, Signal, Signals};
-use crate::twin::{
-    DigitalTwin, KnownNoise, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError,
-    StateSpace, Twin, TwinError,
-};
-use smallvec::SmallVec;
+use crate::twin::{ParameterSpace, Twin, TwinError};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// Holds the named parameters of a twin; θ is shorter by them.
 ///
@@ -25,120 +18,19 @@ pub(crate) fn fix(
     for name in values.keys() {
         all.position(name)?;
     }
-    let held: Vec<Option<f64>> = all.iter().map(|p| values.get(&p.name).copied()).collect();
-    let free = ParameterSpace::new(
-        (all.iter().zip(&held))
-            .filter(|(_, held)| held.is_none())
-            .map(|(p, _)| p.clone()),
-    );
+    let free = all.iter().filter(|p| !values.contains_key(&p.name));
+    let free = ParameterSpace::new(free.cloned());
     if !free.is_empty() {
         free.check()?;
     }
-    let held = Held(held);
-    Ok(match base {
-        Twin::Equations(base) => {
-            let mut outline = base.outline();
-            outline.parameters = free;
-            Twin::Equations(Arc::new(Modified(Fixed {
-                base,
-                outline,
-                held,
-            })))
-        }
-        Twin::BlackBox(base) => Twin::BlackBox(Arc::new(HeldBlackBox {
-            base,
-            parameters: free,
-            held,
-        })),
-    })
-}
-
-/// Values of all parameters; none for those that are free.
-pub(super) struct Held(Vec<Option<f64>>);
-
-impl Held {
-    /// Leaves all of `parameters` free.
-    pub fn none(parameters: usize) -> Self {
-        Self(vec![None; parameters])
-    }
-
-    fn complete(&self, free: &[f64]) -> SmallVec<[f64; 16]> {
-        let mut free = free.iter();
-        (self.0.iter())
-            .map(|held| held.unwrap_or_else(|| free.next().copied().unwrap_or(f64::NAN)))
-            .collect()
-    }
-}
-
-/// Equations with held parameters.
-struct Fixed {
-    base: Arc<dyn StateSpace>,
-    outline: Outline,
-    held: Held,
-}
-
-impl Modify for Fixed {
-    fn base(&self) -> &dyn StateSpace {
-        self.base.as_ref()
-    }
-    fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
-        then(&self.held.complete(theta))
-    }
-    fn outline(&self) -> Outline {
-        self.outline.clone()
-    }
-    fn run(
-        whole: &Modified<Self>,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        let fixed = &whole.0;
-        check_length(fixed.outline.parameters.len(), theta)?;
-        (fixed.base).run(&fixed.held.complete(theta), drive, noise)
-    }
-}
-
-/// A black box with held parameters, and the free ones in another setting.
-pub(super) struct HeldBlackBox {
-    pub base: Arc<dyn DigitalTwin>,
-    pub parameters: ParameterSpace,
-    pub held: Held,
-}
-
-impl DigitalTwin for HeldBlackBox {
-    fn parameters(&self) -> ParameterSpace {
-        self.parameters.clone()
-    }
-    fn signals(&self) -> Signals {
-        self.base.signals()
-    }
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        check_length(self.parameters.len(), theta)?;
-        (self.base).simulate(&self.held.complete(theta), drive, noise)
-    }
-    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
-        check_length(self.parameters.len(), theta)?;
-        self.base.free_run(&self.held.complete(theta), drive)
-    }
-    fn known_noise(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-    ) -> Result<Option<KnownNoise>, SimulationError> {
-        check_length(self.parameters.len(), theta)?;
-        (self.base).known_noise(&self.held.complete(theta), drive)
-    }
+    Ok(base.holding(values, free))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::Drive;
+    use crate::twin::Noise;
     use crate::twin::fixture::AtOnce;
 
     #[test]

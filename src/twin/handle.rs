@@ -1,12 +1,13 @@
 //! The handle by which every stage holds a twin.
 
+use super::composed::{FREE_RUNS, Parts};
 use super::definitions::defined_states;
-use super::digital_twin::FREE_RUNS;
 use crate::record::{Drive, RecordError, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Integrator, KnownNoise, Modified, Modify, Noise, Outline, ParameterSpace,
-    SimulationError, StateSpace, Stepping,
+    Composed, ComposedBlackBox, DigitalTwin, Integrator, KnownNoise, Noise, Outline, Parameter,
+    ParameterSpace, SimulationError, Stepping, TwinError, TwinPart,
 };
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A twin of either kind, cheap to clone. A stage that needs equations matches once, at its entrance.
@@ -22,9 +23,9 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub enum Twin {
     /// A twin that shows its equations.
-    Equations(Arc<dyn StateSpace>),
+    Equations(Composed),
     /// A twin that can only be simulated.
-    BlackBox(Arc<dyn DigitalTwin>),
+    BlackBox(ComposedBlackBox),
 }
 
 debug_by_name!(Twin);
@@ -86,17 +87,29 @@ impl Twin {
         }
     }
 
-    /// The equations; `None` for a black box.
-    pub fn equations(&self) -> Option<&dyn StateSpace> {
+    /// Outputs where their noise is known, so that a likelihood needs no ensemble of runs; `None` of equations.
+    pub(crate) fn known_noise(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<KnownNoise>, SimulationError> {
         match self {
-            Self::Equations(twin) => Some(twin.as_ref()),
+            Self::Equations(_) => Ok(None),
+            Self::BlackBox(twin) => twin.known_noise(theta, drive),
+        }
+    }
+
+    /// The equations; `None` for a black box.
+    pub fn equations(&self) -> Option<&Composed> {
+        match self {
+            Self::Equations(twin) => Some(twin),
             Self::BlackBox(_) => None,
         }
     }
 
     /// Names and units of the equations; `None` for a black box.
     pub fn outline(&self) -> Option<Outline> {
-        self.equations().map(StateSpace::outline)
+        self.equations().map(Composed::outline)
     }
 
     /// Number of simulations that a free run takes.
@@ -110,16 +123,8 @@ impl Twin {
     /// Which states' rates are other states by definition; empty for a black box.
     pub(crate) fn defined_states(&self) -> Vec<bool> {
         match self {
-            Self::Equations(twin) => defined_states(twin.as_ref()),
+            Self::Equations(twin) => defined_states(twin),
             Self::BlackBox(_) => vec![],
-        }
-    }
-
-    /// The twin with changed equations; a black box stays.
-    pub(crate) fn modified<M: Modify>(self, change: impl FnOnce(Arc<dyn StateSpace>) -> M) -> Self {
-        match self {
-            Self::Equations(base) => Self::Equations(Arc::new(Modified(change(base)))),
-            Self::BlackBox(_) => self,
         }
     }
 
@@ -136,19 +141,65 @@ impl Twin {
     ) -> Option<Self> {
         let (mut integrator, mut stepping) = self.integration()?;
         change(&mut integrator, &mut stepping);
-        Some(self.clone().modified(|base| Stepped {
-            base,
-            integrator,
-            stepping,
-        }))
+        Some(self.with([], vec![TwinPart::Steps(integrator, stepping)]))
     }
 
     /// The twin with `hook` called before each of its runs; an error of the hook stops the run.
-    pub(crate) fn watched(&self, hook: impl Hook) -> Self {
-        match self.clone() {
-            Self::Equations(base) => Self::Equations(Arc::new(Modified(Watched { base, hook }))),
-            Self::BlackBox(base) => Self::BlackBox(Arc::new(Watched { base, hook })),
+    pub(crate) fn watched(
+        &self,
+        hook: impl Fn() -> Result<(), SimulationError> + Send + Sync + 'static,
+    ) -> Self {
+        self.with([], vec![TwinPart::Hook(Arc::new(hook))])
+    }
+}
+
+/// Parts of a twin of either kind.
+impl Twin {
+    fn parts(&self) -> &Parts {
+        match self {
+            Self::Equations(twin) => twin.parts(),
+            Self::BlackBox(twin) => twin.parts(),
         }
+    }
+
+    fn of(&self, parts: Arc<Parts>) -> Self {
+        match self {
+            Self::Equations(twin) => Self::Equations(twin.of(parts)),
+            Self::BlackBox(twin) => Self::BlackBox(twin.of(parts)),
+        }
+    }
+
+    /// Number of all parameters, held ones counted: the entry of the next one.
+    pub(crate) fn entries(&self) -> usize {
+        self.parts().entries()
+    }
+
+    /// Returns the entry of the free parameter of this index.
+    pub(crate) fn entry(&self, free: usize) -> usize {
+        self.parts().entry(free)
+    }
+
+    /// Returns the twin with parameters and parts more. Parts act together: along a signal in this order, behind those that are there. A
+    /// black box takes those that act on signals and their noise.
+    pub(crate) fn with(
+        &self,
+        parameters: impl IntoIterator<Item = Parameter>,
+        parts: Vec<TwinPart>,
+    ) -> Self {
+        self.of(self.parts().with(parameters, parts))
+    }
+
+    /// Returns the twin with priors and bounds as `change` leaves them.
+    pub(super) fn with_space(
+        &self,
+        change: impl FnOnce(&mut ParameterSpace) -> Result<(), TwinError>,
+    ) -> Result<Self, TwinError> {
+        Ok(self.of(self.parts().with_space(change)?))
+    }
+
+    /// Returns the twin with these parameters held, which it has; `free` are the others.
+    pub(super) fn holding(&self, values: &BTreeMap<String, f64>, free: ParameterSpace) -> Self {
+        self.of(self.parts().holding(values, free))
     }
 }
 
@@ -162,7 +213,7 @@ impl From<Arc<dyn DigitalTwin>> for Twin {
     fn from(twin: Arc<dyn DigitalTwin>) -> Self {
         match twin.clone().equations() {
             Some(equations) => Self::Equations(equations),
-            None => Self::BlackBox(twin),
+            None => Self::BlackBox(twin.into()),
         }
     }
 }
@@ -185,17 +236,7 @@ impl DigitalTwin for Twin {
     fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
         self.free_run(theta, drive)
     }
-    fn known_noise(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-    ) -> Result<Option<KnownNoise>, SimulationError> {
-        match self {
-            Self::Equations(_) => Ok(None),
-            Self::BlackBox(twin) => twin.known_noise(theta, drive),
-        }
-    }
-    fn equations(self: Arc<Self>) -> Option<Arc<dyn StateSpace>> {
+    fn equations(self: Arc<Self>) -> Option<Composed> {
         match self.as_ref() {
             Self::Equations(twin) => Some(twin.clone()),
             Self::BlackBox(_) => None,
@@ -203,80 +244,10 @@ impl DigitalTwin for Twin {
     }
 }
 
-/// Called before each run of a watched twin.
-pub(crate) trait Hook: Fn() -> Result<(), SimulationError> + Send + Sync + 'static {}
-
-impl<F: Fn() -> Result<(), SimulationError> + Send + Sync + 'static> Hook for F {}
-
-/// Equations with another stepping.
-struct Stepped {
-    base: Arc<dyn StateSpace>,
-    integrator: Integrator,
-    stepping: Stepping,
-}
-
-impl Modify for Stepped {
-    fn base(&self) -> &dyn StateSpace {
-        self.base.as_ref()
-    }
-
-    fn integrator(&self) -> Integrator {
-        self.integrator
-    }
-
-    fn stepping(&self) -> Stepping {
-        self.stepping
-    }
-}
-
-/// A twin with a hook before each run.
-struct Watched<B: ?Sized, H> {
-    base: Arc<B>,
-    hook: H,
-}
-
-impl<H: Hook> Modify for Watched<dyn StateSpace, H> {
-    fn base(&self) -> &dyn StateSpace {
-        self.base.as_ref()
-    }
-
-    fn run(
-        whole: &Modified<Self>,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        (whole.0.hook)()?;
-        whole.0.base.run(theta, drive, noise)
-    }
-}
-
-impl<H: Hook> DigitalTwin for Watched<dyn DigitalTwin, H> {
-    fn parameters(&self) -> ParameterSpace {
-        self.base.parameters()
-    }
-
-    fn signals(&self) -> Signals {
-        self.base.signals()
-    }
-
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        (self.hook)()?;
-        self.base.simulate(theta, drive, noise)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{
-        Adaptation, Interval, NoiseLevel, Now, Parameter, StartLevel, TwinError, adapt, fix,
-    };
+    use crate::twin::{Adaptation, Interval, NoiseLevel, Now, StartLevel, StateSpace, adapt, fix};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// ẋ = −k·x, y = x with a noisy sensor.

@@ -1,6 +1,6 @@
 //! Fixed-step integrators that carry the equations from one sample to the next.
 
-use crate::twin::Interval;
+use crate::twin::{Interval, Outline};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 pub struct Now<'a> {
     /// Time in seconds from the first sample.
     pub t: f64,
-    /// Step Δt in seconds: to the next sample, or a substep where [`StateSpace::drift`](super::StateSpace::drift) is evaluated.
+    /// Step Δt in seconds: to the next sample, or a substep where [`StateSpace::drift`](crate::twin::StateSpace::drift) is evaluated.
     pub dt: f64,
     /// Inputs at this time.
     pub u: &'a [f64],
@@ -118,31 +118,78 @@ pub enum Integrator {
 }
 
 /// Buffers of one twin that outlive a step, so that the loop allocates nothing.
-#[derive(Debug, Clone, Default)]
-pub struct Workspace {
+#[derive(Debug, Clone)]
+pub(crate) struct Workspace {
     slopes: [Vec<f64>; 4],
     stage: Vec<f64>,
+    integrator: Integrator,
     /// Substeps and lines of inputs; `None` where a sample is one step and inputs are held.
-    pub(super) refined: Option<Box<Refined>>,
+    refined: Option<Box<Refined>>,
 }
 
 /// Rule by which a twin moves between samples.
 #[derive(Debug, Clone)]
-pub(super) struct Refined {
-    pub substeps: usize,
+struct Refined {
+    substeps: usize,
     /// Limits that are felt, by state.
-    pub limits: Vec<(usize, Interval)>,
+    limits: Vec<(usize, Interval)>,
     /// Inputs at a stage.
-    pub inputs: Vec<f64>,
+    inputs: Vec<f64>,
 }
 
 impl Workspace {
+    /// For equations of this outline, with these boxes of the states.
+    pub(super) fn of(
+        outline: &Outline,
+        limits: &[Interval],
+        (integrator, stepping): (Integrator, Stepping),
+    ) -> Self {
+        let refined = (stepping != Stepping::default()).then(|| {
+            Box::new(Refined {
+                substeps: stepping.substeps.max(1),
+                limits: felt(limits),
+                inputs: vec![0.0; outline.inputs.len()],
+            })
+        });
+        Self {
+            integrator,
+            refined,
+            ..Self::of_states(outline.states.len())
+        }
+    }
+
     /// For `states` states, without substeps.
-    pub(super) fn of_states(states: usize) -> Self {
+    fn of_states(states: usize) -> Self {
         Self {
             slopes: std::array::from_fn(|_| vec![0.0; states]),
             stage: vec![0.0; states],
+            integrator: Integrator::Euler,
             refined: None,
+        }
+    }
+
+    /// Returns whether a sample is one step of Euler's rule, inputs held.
+    #[inline]
+    pub(super) fn is_plain(&self) -> bool {
+        self.refined.is_none() && self.integrator == Integrator::Euler
+    }
+
+    /// Carries points of `n` states each over one sample, in the substeps of the twin.
+    #[inline(always)]
+    pub(super) fn carry(
+        &mut self,
+        n: usize,
+        now: &Now<'_>,
+        x: &mut [f64],
+        drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
+    ) {
+        let rule = self.integrator;
+        match self.refined.take() {
+            Some(mut refined) => {
+                rule.substeps(n, now, x, (self, &mut refined), drift);
+                self.refined = Some(refined);
+            }
+            None => rule.step(now, x, self, drift),
         }
     }
 
@@ -150,6 +197,14 @@ impl Workspace {
     pub(super) fn stage(&mut self, states: usize) -> &mut [f64] {
         grown(&mut self.stage, states)
     }
+}
+
+/// Boxes that are felt, by state.
+pub(super) fn felt(limits: &[Interval]) -> Vec<(usize, Interval)> {
+    let limits = limits.iter().copied().enumerate();
+    limits
+        .filter(|(_, limit)| *limit != Interval::EVERYTHING)
+        .collect()
 }
 
 /// The first `length` numbers of a buffer, which grows where it is shorter.
@@ -164,7 +219,7 @@ fn grown(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
 impl Integrator {
     /// One step in place, the input held: `x(t)` becomes `x(t + Δt)` under `drift(now, x, dx)`.
     #[inline]
-    pub fn step(
+    pub(crate) fn step(
         self,
         now: &Now<'_>,
         x: &mut [f64],
@@ -172,25 +227,6 @@ impl Integrator {
         mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
         self.step_in_stages(now, x, work, |_, now, x, dx| drift(now, x, dx));
-    }
-
-    /// Carries points of `n` states each over one sample, in the substeps of `work`.
-    #[inline(always)]
-    pub(super) fn carry(
-        self,
-        n: usize,
-        now: &Now<'_>,
-        x: &mut [f64],
-        work: &mut Workspace,
-        drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
-    ) {
-        match work.refined.take() {
-            Some(mut refined) => {
-                self.substeps(n, now, x, (work, &mut refined), drift);
-                work.refined = Some(refined);
-            }
-            None => self.step(now, x, work, drift),
-        }
     }
 
     /// Steps of Δt/m, inputs between this sample's and the next one's where there is one. States are put into their limits between substeps, as
@@ -242,7 +278,7 @@ impl Integrator {
 
     /// As [`step`](Self::step); `drift` is also told the share of the step that has passed at each stage.
     #[inline]
-    pub(super) fn step_in_stages(
+    fn step_in_stages(
         self,
         now: &Now<'_>,
         x: &mut [f64],

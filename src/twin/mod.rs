@@ -9,12 +9,10 @@
 //! | draw noise that pairs across runs | [`Noise`] |
 //! | find out what is wrong with a new twin | [`conformance`] |
 
-mod acting;
 mod adapt;
-mod advance;
+mod composed;
 pub mod conformance;
 mod definitions;
-mod digital_twin;
 mod direction;
 mod error;
 mod fix;
@@ -23,20 +21,21 @@ pub(crate) mod fixture;
 mod handle;
 mod integrator;
 mod interval;
-mod modified;
 mod names;
 mod noise;
 mod outline;
 mod parameter;
 mod points;
-mod simulation;
 mod state_space;
 
-pub(crate) use acting::Acting;
 pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt, begun};
+pub(crate) use composed::{
+    Acting, DeadTime, Disturbance, Entry, FittedLevels, KnownNoise, LARGEST, LevelSource, NoiseLaw,
+    NoisePart, OutlierLaw, OutputChannel, ParameterChange, Placed, RateChange, SensorNoise,
+    SignalChange, SignalPart, StateLimit, StatePair, TwinPart, WhiteLevel,
+};
+pub use composed::{Composed, ComposedBlackBox, DigitalTwin};
 pub(crate) use definitions::rates;
-pub use digital_twin::DigitalTwin;
-pub(crate) use digital_twin::{KnownNoise, NoisePart};
 pub(crate) use direction::{combination, oriented};
 pub use error::{SimulationError, TwinError};
 pub(crate) use fix::fix;
@@ -44,7 +43,6 @@ pub use handle::Twin;
 pub use integrator::{Hold, Integrator, Now, Stepping};
 pub(crate) use integrator::{MOST_SUBSTEPS, Workspace};
 pub use interval::Interval;
-pub(crate) use modified::{Modified, Modify};
 pub(crate) use names::{check_twin, is_memory};
 pub(crate) use noise::mix;
 pub use noise::{Noise, Source};
@@ -52,6 +50,4 @@ pub use outline::Outline;
 pub(crate) use parameter::PRIOR_DEVIATION;
 pub use parameter::{Parameter, ParameterSpace, Role};
 pub(crate) use points::{LanePoints, Layout, Points};
-pub(crate) use simulation::DeadTime;
-pub(crate) use state_space::Advance;
 pub use state_space::{Outliers, StateSpace};

@@ -1,15 +1,14 @@
 //! Several states side by side, carried through equations by one call.
 
 use crate::math::{LANES, Lanes};
-use crate::twin::Interval;
+use crate::twin::{Interval, Now};
 
 /// So many numbers are kept on the stack.
 const FEW: usize = 4;
 
 /// Layout of points side by side: each takes `stride` numbers, and the first `states` of these are the twin's.
-#[doc(hidden)]
 #[derive(Debug, Clone, Copy)]
-pub struct Layout {
+pub(crate) struct Layout {
     /// Number of states of the twin.
     pub states: usize,
     /// Numbers from one point to the next.
@@ -23,15 +22,6 @@ impl Layout {
         Self {
             states,
             stride: states,
-        }
-    }
-
-    /// Returns the layout of the base twin's states, without the last `added` ones.
-    #[inline(always)]
-    pub(crate) fn without(self, added: usize) -> Self {
-        Self {
-            states: self.states - added,
-            ..self
         }
     }
 
@@ -49,9 +39,8 @@ impl Layout {
 }
 
 /// Points that a filter carries over a step; n states each, one point after the other.
-#[doc(hidden)]
 #[derive(Debug)]
-pub struct Points<'w> {
+pub(crate) struct Points<'w> {
     /// First the `moving` points: put into the limits, advanced, constrained; the first is the centre. Behind them two for each state: the
     /// centre after its motion, with that state shifted up and down, constrained. Those of a state without shift hold nothing of use.
     pub all: &'w mut [f64],
@@ -64,9 +53,8 @@ pub struct Points<'w> {
 }
 
 /// Points of several filters side by side, one filter a lane; as [`Points`] otherwise.
-#[doc(hidden)]
 #[derive(Debug)]
-pub struct LanePoints<'w> {
+pub(crate) struct LanePoints<'w> {
     /// One moving point and two for each state, then two for each state. The last come back where a constraint acted.
     pub all: &'w mut [Lanes],
     /// Limits by state.
@@ -81,7 +69,7 @@ pub struct LanePoints<'w> {
 
 /// Copies one lane out.
 #[inline(always)]
-pub(super) fn gather(from: &[Lanes], lane: usize, to: &mut [f64]) {
+fn gather(from: &[Lanes], lane: usize, to: &mut [f64]) {
     for (to, from) in to.iter_mut().zip(from) {
         *to = from.0[lane];
     }
@@ -89,7 +77,7 @@ pub(super) fn gather(from: &[Lanes], lane: usize, to: &mut [f64]) {
 
 /// Copies one lane in; the first also into the lanes that no filter uses.
 #[inline(always)]
-pub(super) fn scatter(from: &[f64], (lane, used): (usize, usize), to: &mut [Lanes]) {
+fn scatter(from: &[f64], (lane, used): (usize, usize), to: &mut [Lanes]) {
     for (to, from) in to.iter_mut().zip(from) {
         to.0[lane] = *from;
     }
@@ -159,6 +147,98 @@ pub(super) fn advance_one_by_one(
         constrain(x);
     }
     bent | changes(centre, constrain)
+}
+
+/// Carries the points of several filters, one after the other; returns the lanes in which a constraint acted.
+#[inline(always)]
+pub(super) fn lanes_one_by_one(
+    n: usize,
+    now: &[Now<'_>],
+    points: LanePoints<'_>,
+    mut advance: impl FnMut(&Now<'_>, Points<'_>) -> bool,
+) -> [bool; LANES] {
+    let (moving, length) = (1 + 2 * n, (1 + 4 * n) * n);
+    let (all, one) = (&mut points.all[..length], &mut points.one[..length]);
+    let (shifts, shift) = (&points.shifts[..n], &mut points.shift[..n]);
+    let mut bent = [false; LANES];
+    for (lane, at) in now.iter().enumerate() {
+        gather(&all[..moving * n], lane, &mut one[..moving * n]);
+        gather(shifts, lane, shift);
+        let point = Points {
+            all: &mut *one,
+            moving,
+            limits: points.limits,
+            shifts: &*shift,
+        };
+        bent[lane] = advance(at, point);
+        let (moved, shifted) = one.split_at(moving * n);
+        scatter(moved, (lane, now.len()), &mut all[..moving * n]);
+        if bent[lane] {
+            scatter(shifted, (lane, now.len()), &mut all[moving * n..]);
+        }
+    }
+    bent
+}
+
+/// States of a twin in lanes, at most.
+const MOST: usize = 4;
+
+/// Output of the points of several filters, one after the other.
+#[inline(always)]
+pub(super) fn observe_lanes(
+    n: usize,
+    now: &[Now<'_>],
+    x: &[Lanes],
+    y: &mut [Lanes],
+    buffer: &mut [f64],
+    observe: impl Fn(&Now<'_>, &[f64], &mut [f64]),
+) {
+    let points = 1 + 2 * n;
+    let (x, y) = (&x[..points * n], &mut y[..points]);
+    let buffer = &mut buffer[..points * n];
+    let mut outputs = [0.0; 1 + 2 * MOST];
+    let outputs = &mut outputs[..points];
+    for (lane, at) in now.iter().enumerate() {
+        gather(x, lane, buffer);
+        observe(at, buffer, outputs);
+        scatter(outputs, (lane, now.len()), y);
+    }
+}
+
+/// Noise levels of several filters with one output, one after the other.
+#[inline(always)]
+pub(super) fn noise_lanes(
+    n: usize,
+    now: &[Now<'_>],
+    process: &mut [Lanes],
+    measurement: &mut Lanes,
+    noise: impl Fn(&Now<'_>, &mut [f64], &mut [f64]),
+) {
+    let mut levels = [0.0; MOST + 1];
+    let (q, r) = levels[..=n].split_at_mut(n);
+    for (lane, at) in now.iter().enumerate() {
+        q.fill(0.0);
+        r.fill(0.0);
+        noise(at, q, r);
+        scatter(q, (lane, now.len()), &mut process[..n]);
+        scatter(r, (lane, now.len()), std::slice::from_mut(measurement));
+    }
+}
+
+/// Puts values of one output of several filters through the readout; returns the lanes that it changed.
+#[inline(always)]
+pub(super) fn readout_lanes(
+    now: &[Now<'_>],
+    y: &mut [Lanes],
+    readout: impl Fn(&Now<'_>, &mut [f64]) -> bool,
+) -> [bool; LANES] {
+    let mut changed = [false; LANES];
+    for ((lane, at), changed) in now.iter().enumerate().zip(&mut changed) {
+        for y in &mut *y {
+            *changed |= readout(at, &mut y.0[lane..=lane]);
+        }
+    }
+    changed
 }
 
 /// Puts outputs, `p` each, through the readout; returns whether it changed any.

@@ -1,21 +1,14 @@
-//! Twins with effects: one entry, with a type for equations and one for black boxes behind it.
+//! Twins with effects: each effect is a part of the twin.
 
-mod black_box;
-mod equations;
-mod finish;
-
-use super::batch::Pair;
 use super::check::{check_effects, targets};
-use super::kind::EffectKind;
-use super::law::{Instant, Law, NOISE_ENTERS, SignalLaw};
+use super::law::{Law, NOISE_ENTERS};
 use super::placed::Effect;
 use super::unit::magnitude_unit;
-use crate::record::{Drive, Quantity, RecordError, Signal, Signals};
+use crate::record::{Quantity, Signals};
 use crate::twin::{
-    Interval, Modified, Parameter, ParameterSpace, Role, SimulationError, Twin, TwinError,
+    Interval, Parameter, Placed, Role, SignalChange, SignalPart, SimulationError, StatePair, Twin,
+    TwinError, TwinPart,
 };
-use black_box::AugmentedBlackBox;
-use equations::AugmentedEquations;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -64,165 +57,102 @@ fn augmented(base: Twin, effects: Vec<Effect>, may_be_late: bool) -> Result<Twin
         return Ok(base);
     }
     let outline = base.outline();
-    check_effects(&effects, outline.as_ref(), &base.signals())?;
-    let slots = Slots::of(&base, &effects, may_be_late);
-    Ok(match base {
-        Twin::Equations(base) => {
-            Twin::Equations(Arc::new(Modified(AugmentedEquations::new(base, slots))))
-        }
-        Twin::BlackBox(base) => Twin::BlackBox(Arc::new(AugmentedBlackBox::new(base, slots))),
-    })
+    let signals = base.signals();
+    check_effects(&effects, outline.as_ref(), &signals)?;
+    let states = outline.as_ref().map_or(&[][..], |o| &o.states);
+    let mut parameters = Vec::new();
+    let mut placed: Vec<(Effect, Range<usize>)> = Vec::new();
+    for effect in effects {
+        let from = base.entries() + parameters.len();
+        parameters.extend(magnitude_parameters(&effect, states, &signals));
+        placed.push((effect, from..base.entries() + parameters.len()));
+    }
+    // Along a signal, in the order of the library.
+    placed.sort_by_key(|(effect, _)| effect.kind().position());
+    let may_be_late = may_be_late && signals.outputs.len() == 1 && outline.is_some();
+    let is_late = |effect: &Effect| {
+        may_be_late && effect.kind().is_dead_time() && matches!(effect.law(), Law::Sensor(_))
+    };
+    let late = placed.iter().filter(|(effect, _)| is_late(effect));
+    let late: Vec<usize> = late.map(|(_, magnitudes)| magnitudes.start).collect();
+    let mut parts: Vec<TwinPart> = (placed.iter().cloned())
+        .map(|(effect, magnitudes)| check_of(effect, magnitudes))
+        .collect();
+    for (effect, magnitudes) in placed.into_iter().filter(|(effect, _)| !is_late(effect)) {
+        let known = targets(effect.law().target(), outline.as_ref(), &signals);
+        parts.push(part(&base, &effect, magnitudes, &known));
+    }
+    if !late.is_empty() {
+        parts.push(TwinPart::Late(late));
+    }
+    Ok(base.with(parameters, parts))
 }
 
-/// Where the numbers of an effect stand.
-#[derive(Debug, Clone)]
-struct Place {
-    /// Magnitudes in θ.
-    magnitudes: Range<usize>,
-    /// Index of the target among channels, states or parameters.
-    target: usize,
-    /// Index of the other state.
-    other: Option<usize>,
-    /// True of a delay of the only sensor that makes the whole twin late.
-    late: bool,
+/// Returns the check of an effect's magnitudes before a run.
+fn check_of(effect: Effect, magnitudes: Range<usize>) -> TwinPart {
+    TwinPart::Check(Arc::new(move |theta: &[f64], dt| {
+        let check = effect.kind().check_values(&theta[magnitudes.clone()], dt);
+        check
+            .map_err(|problem| SimulationError::fatal(format!("effect {}: {problem}", effect.id())))
+    }))
 }
 
-impl Place {
-    /// Target and other state.
-    fn pair(&self) -> Pair {
-        Pair {
-            target: self.target,
-            other: self.other,
-        }
-    }
-
-    fn m<'a>(&self, theta: &'a [f64]) -> &'a [f64] {
-        &theta[self.magnitudes.clone()]
+/// Returns the part that an effect is; `known` are the targets of its kind.
+fn part(base: &Twin, effect: &Effect, magnitudes: Range<usize>, known: &[String]) -> TwinPart {
+    let index = |name: &str| known.iter().position(|k| k == name);
+    let target = index(effect.target()).unwrap_or(0);
+    let on = StatePair {
+        target,
+        other: effect.other().and_then(index),
+    };
+    let kind = effect.kind();
+    let signal = |law: &Arc<dyn SignalChange>| SignalPart {
+        name: effect.key().to_string(),
+        target,
+        memory: kind.memory_values(),
+        is_of_readings: kind.position() > NOISE_ENTERS,
+        is_dead_time: kind.is_dead_time(),
+        change: placed(law, &magnitudes),
+    };
+    match effect.law() {
+        Law::Sensor(law) => TwinPart::Sensor(signal(law)),
+        Law::Actuator(law) => TwinPart::Actuator(signal(law)),
+        Law::Force(law) => TwinPart::Rate {
+            on,
+            change: placed(law, &magnitudes),
+        },
+        Law::Limit(law) => TwinPart::Limit {
+            on,
+            limit: placed(law, &magnitudes),
+        },
+        Law::Parameter(law) => TwinPart::Parameter {
+            entry: base.entry(target),
+            change: placed(law, &magnitudes),
+        },
+        Law::MeasurementNoise(law) => TwinPart::MeasurementNoise {
+            target,
+            level: placed(law, &magnitudes),
+        },
+        Law::ProcessNoise(law) => TwinPart::ProcessNoise {
+            target,
+            level: placed(law, &magnitudes),
+        },
+        Law::Rounding(law) => TwinPart::Rounding {
+            target,
+            step: placed(law, &magnitudes),
+        },
+        Law::Outliers(law) => TwinPart::Outliers {
+            target,
+            law: placed(law, &magnitudes),
+            source: effect.key().to_string(),
+        },
     }
 }
 
-/// An effect and its place.
-#[derive(Debug, Clone)]
-struct Slot {
-    effect: Effect,
-    place: Place,
-}
-
-impl Slot {
-    /// Returns whether the effect acts on readings, which contain the noise of measurement.
-    fn is_of_readings(&self) -> bool {
-        self.effect.kind().position() > NOISE_ENTERS
-    }
-
-    /// Passes the channel of a whole signal through a law.
-    fn pass(&self, law: &SignalLaw, theta: &[f64], drive: &Drive, signal: &mut Signal) {
-        let m = self.place.m(theta);
-        let mut channel = signal.column_mut(self.place.target);
-        let mut memory = vec![channel[0]; self.effect.kind().memory_values()];
-        for (k, value) in channel.iter_mut().enumerate() {
-            let now = Instant {
-                t: drive.time(k),
-                dt: drive.step(k),
-            };
-            *value = law(m, now, &mut memory, *value);
-        }
-    }
-}
-
-/// The function of a law, and its place.
-struct Placed<L: ?Sized> {
-    law: Arc<L>,
-    at: Place,
-}
-
-/// The effects of a twin, sorted along the signal.
-#[derive(Debug, Clone)]
-struct Slots {
-    /// Length of the base twin's θ.
-    base: usize,
-    all: Vec<Slot>,
-    parameters: Vec<Parameter>,
-}
-
-impl Slots {
-    /// Targets must have been checked.
-    fn of(base: &Twin, effects: &[Effect], may_be_late: bool) -> Self {
-        let outline = base.outline();
-        let signals = base.signals();
-        let states = outline.as_ref().map_or(&[][..], |o| &o.states);
-        let base = base.parameters().len();
-        let mut parameters = Vec::new();
-        let mut all: Vec<Slot> = Vec::new();
-        for effect in effects {
-            let known = targets(effect.law().target(), outline.as_ref(), &signals);
-            let index = |name: &str| known.iter().position(|k| k == name);
-            let from = base + parameters.len();
-            parameters.extend(magnitude_parameters(effect, states, &signals));
-            let place = Place {
-                magnitudes: from..base + parameters.len(),
-                target: index(effect.target()).unwrap_or(0),
-                other: effect.other().and_then(index),
-                late: may_be_late
-                    && effect.kind().is_dead_time()
-                    && matches!(effect.law(), Law::Sensor(_))
-                    && signals.outputs.len() == 1,
-            };
-            let effect = effect.clone();
-            all.push(Slot { effect, place });
-        }
-        all.sort_by_key(|slot| slot.effect.kind().position());
-        Self {
-            base,
-            all,
-            parameters,
-        }
-    }
-
-    /// The base twin's parameters, then the magnitudes.
-    fn space(&self, base: &ParameterSpace) -> ParameterSpace {
-        ParameterSpace::new(base.iter().chain(&self.parameters).cloned())
-    }
-
-    /// The functions of one kind of law.
-    fn of_law<L: ?Sized>(&self, pick: impl Fn(&EffectKind) -> Option<&Arc<L>>) -> Vec<Placed<L>> {
-        (self.all.iter())
-            .filter_map(|slot| {
-                Some(Placed {
-                    law: pick(slot.effect.kind())?.clone(),
-                    at: slot.place.clone(),
-                })
-            })
-            .collect()
-    }
-
-    /// The drive behind the actuator effects; `None` without any.
-    fn actuated(&self, theta: &[f64], drive: &Drive) -> Result<Option<Drive>, SimulationError> {
-        let mut inputs: Option<Signal> = None;
-        for slot in &self.all {
-            if let Law::Actuator(law) = slot.effect.law() {
-                let inputs = inputs.get_or_insert_with(|| drive.inputs().clone());
-                slot.pass(law.as_ref(), theta, drive, inputs);
-            }
-        }
-        let Some(inputs) = inputs else {
-            return Ok(None);
-        };
-        match drive.with_inputs(inputs) {
-            Ok(actuated) => Ok(Some(actuated)),
-            Err(RecordError::NotFinite { sample, .. }) => Err(SimulationError::Diverged {
-                at: drive.time(sample),
-            }),
-            Err(error) => Err(SimulationError::Fatal(error.into())),
-        }
-    }
-
-    fn check(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        for Slot { effect, place } in &self.all {
-            (effect.kind().check_values(place.m(theta), dt)).map_err(|problem| {
-                SimulationError::fatal(format!("effect {}: {problem}", effect.id()))
-            })?;
-        }
-        Ok(())
+fn placed<L: ?Sized>(law: &Arc<L>, magnitudes: &Range<usize>) -> Placed<L> {
+    Placed {
+        law: law.clone(),
+        magnitudes: magnitudes.clone(),
     }
 }
 

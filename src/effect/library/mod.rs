@@ -7,7 +7,6 @@ mod sentences;
 mod shared;
 mod state;
 
-pub(super) use shared::whole_samples;
 pub(crate) use shared::{clamp, lag};
 
 use super::kind::EffectKind;

@@ -64,13 +64,6 @@ pub(super) fn delay(delay: f64, dt: f64, past: &mut [f64], value: f64) -> f64 {
     }
 }
 
-/// Whole samples of a delay; what is left lies between 0.37 and 1.37 samples, or is all of a shorter delay. Delays are often whole numbers
-/// of samples: from there, the number does not change under the small steps of a derivative.
-pub(in crate::effect) fn whole_samples(delay: f64, dt: f64) -> usize {
-    let most = (DELAY_SAMPLES - 1) as f64;
-    (delay / dt - 0.37).floor().clamp(0.0, most) as usize
-}
-
 /// Refuses a delay that the register does not reach at step `dt`.
 pub(super) fn check_delay(delay: f64, dt: f64) -> Result<(), String> {
     let longest = (DELAY_SAMPLES - 1) as f64 * dt;

@@ -5,7 +5,7 @@ use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::FilterError;
 use crate::math::Stencil;
 use crate::record::{Drive, Record};
-use crate::twin::{Acting, Interval, Now, ParameterSpace, StateSpace, Workspace};
+use crate::twin::{Acting, Composed, Interval, Now, ParameterSpace, Workspace};
 use nalgebra::{DMatrix, DVector};
 
 /// Tracks θ along a record from `start`, brought into the bounds, and returns θ after the last row.
@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, DVector};
 /// Source: Wan & Nelson, "Dual extended Kalman filter methods", in Haykin (ed.), *Kalman Filtering and Neural Networks*
 /// (2001), chapter 5, without the gain's own derivative.
 pub fn dual_filter(
-    twin: &dyn StateSpace,
+    twin: &Composed,
     record: &Record,
     start: &[f64],
 ) -> Result<Vec<f64>, EvaluateError> {
@@ -52,7 +52,7 @@ pub fn dual_filter(
     let noise = DMatrix::identity(p, p) * (BASELINE.measurement * BASELINE.measurement);
     for k in 0..record.samples() {
         let acting = Acting::of(twin, &theta, drive)?;
-        let now = acting.at(k, &theta);
+        let now = acting.at(k);
         let diverged = || FilterError::Diverged { at: now.t };
         let seen = step.observe(&now, x.as_slice());
         let slope = step.observe_slope(&now, x.as_slice())?;
@@ -81,7 +81,7 @@ pub fn dual_filter(
         theta = next;
 
         let acting = Acting::of(twin, &theta, drive)?;
-        let now = acting.at(k, &theta);
+        let now = acting.at(k);
         let motion = step.advance_slope(&now, x.as_slice())?;
         sensitivity =
             &motion * (kept * sensitivity) + step.theta_slope((drive, k), &theta, x.as_slice())?;
@@ -115,7 +115,7 @@ fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
 
 /// One step of the twin without noise, and its derivatives.
 struct TwinStep<'a> {
-    twin: &'a dyn StateSpace,
+    twin: &'a Composed,
     limits: Vec<Interval>,
     p: usize,
     steps: Vec<f64>,
@@ -125,10 +125,10 @@ struct TwinStep<'a> {
 }
 
 impl<'a> TwinStep<'a> {
-    fn new(twin: &'a dyn StateSpace, space: &ParameterSpace, p: usize) -> Self {
+    fn new(twin: &'a Composed, space: &ParameterSpace, p: usize) -> Self {
         Self {
             twin,
-            limits: twin.limits(),
+            limits: twin.limits().to_vec(),
             p,
             steps: space
                 .widths()
@@ -137,7 +137,7 @@ impl<'a> TwinStep<'a> {
                 .collect(),
             lower: space.bounds().iter().map(|b| b.low()).collect(),
             upper: space.bounds().iter().map(|b| b.high()).collect(),
-            work: Workspace::new(twin),
+            work: twin.workspace(),
         }
     }
 
@@ -150,7 +150,7 @@ impl<'a> TwinStep<'a> {
     /// Without limits: their slope would be zero, and θ would be unseen ever after.
     fn advance(&mut self, now: &Now<'_>, x: &[f64]) -> Vec<f64> {
         let mut next = x.to_vec();
-        self.twin.advance(now, &mut next, &mut self.work);
+        self.twin.step(now, &mut next, &mut self.work);
         self.twin.constrain(now, &mut next);
         next
     }
@@ -189,7 +189,7 @@ impl<'a> TwinStep<'a> {
         let stencil = Stencil::new(theta, &self.steps, &self.lower, &self.upper)?;
         stencil.jacobian(|theta| {
             let acting = Acting::of(self.twin, theta, drive)?;
-            Ok(DVector::from_vec(self.advance(&acting.at(k, theta), x)))
+            Ok(DVector::from_vec(self.advance(&acting.at(k), x)))
         })
     }
 }
@@ -198,7 +198,7 @@ impl<'a> TwinStep<'a> {
 mod tests {
     use super::*;
     use crate::record::{Quantity, Signal};
-    use crate::twin::{DigitalTwin, Noise, Outline, Parameter};
+    use crate::twin::{DigitalTwin, Noise, Outline, Parameter, StateSpace};
 
     /// ẋ = −k·x + u, measured well.
     struct Leak;
@@ -235,7 +235,7 @@ mod tests {
                 .unwrap();
             let record = Record::new(drive.clone(), outputs).unwrap();
             for start in [0.7, 2.5] {
-                let theta = dual_filter(&Leak, &record, &[start]).unwrap();
+                let theta = dual_filter(&Leak.into(), &record, &[start]).unwrap();
                 assert!((theta[0] - 1.4).abs() < 0.05, "from {start}: {theta:?}");
             }
         }
@@ -245,7 +245,7 @@ mod tests {
     fn it_stays_in_the_bounds() {
         let drive = Drive::new(0.1, Signal::ones((50, 1))).unwrap();
         let record = Record::new(drive, Signal::from_elem((50, 1), 40.0)).unwrap();
-        let theta = dual_filter(&Leak, &record, &[9.0]).unwrap();
+        let theta = dual_filter(&Leak.into(), &record, &[9.0]).unwrap();
         assert!((0.1..=4.0).contains(&theta[0]), "{theta:?}");
     }
 
@@ -258,7 +258,7 @@ mod tests {
             .simulate(&[1.5], &drive, Noise::new(1, "dual", 0))
             .unwrap();
         let record = Record::new(drive, outputs).unwrap();
-        let theta = dual_filter(&twin, &record, &[1.3]).unwrap();
+        let theta = dual_filter(&twin.into(), &record, &[1.3]).unwrap();
         assert!((theta[0] - 1.5).abs() < 0.1, "{theta:?}");
     }
 }

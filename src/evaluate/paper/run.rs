@@ -88,7 +88,7 @@ impl BenchmarkRun {
                 ScoredMethod::DualFilter(from) => {
                     let theta = match twin {
                         Twin::Equations(equations) => start(from)
-                            .and_then(|start| dual_filter(equations.as_ref(), record, &start).ok()),
+                            .and_then(|start| dual_filter(equations, record, &start).ok()),
                         Twin::BlackBox(_) => None,
                     };
                     (theta, None)

@@ -28,7 +28,7 @@ use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::Study;
-use crate::twin::{DigitalTwin, Role, Twin};
+use crate::twin::{Role, Twin};
 use nalgebra::DVector;
 
 /// Part of the weak prior that is kept: just enough for parameters that no record tells apart.
@@ -272,7 +272,7 @@ mod tests {
 
     /// y = gain·u + noise, with runs counted.
     struct Counted;
-    impl DigitalTwin for Counted {
+    impl crate::twin::DigitalTwin for Counted {
         fn parameters(&self) -> ParameterSpace {
             ParameterSpace::new([Parameter::new("gain", "1", 0.5, 1.5).within(0.2, 3.0)])
         }

@@ -11,7 +11,7 @@
 use super::law::DeparturePlace;
 use super::scene::{Extent, Scene};
 use crate::evaluate::trials::numbers::TRIAL;
-use crate::twin::{Now, StateSpace};
+use crate::twin::{Composed, Now};
 
 /// States and sensors that something enters.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,7 +48,7 @@ struct At {
 
 impl At {
     /// Rates of the states, then outputs.
-    fn values(&self, twin: &dyn StateSpace, outputs: usize) -> Vec<f64> {
+    fn values(&self, twin: &Composed, outputs: usize) -> Vec<f64> {
         let now = Now::new(self.t, self.dt, &self.u, &self.theta);
         let (mut rates, mut y) = (vec![0.0; self.x.len()], vec![0.0; outputs]);
         twin.drift(&now, &self.x, &mut rates);
@@ -65,7 +65,7 @@ impl At {
 
 impl Structure {
     /// Compares the equations of a twin at some moments of a record at θ. What does not enter leaves every digit as it is.
-    pub fn of(twin: &dyn StateSpace, theta: &[f64], scene: &Scene) -> Self {
+    pub fn of(twin: &Composed, theta: &[f64], scene: &Scene) -> Self {
         let outline = twin.outline();
         let (states, outputs) = (outline.states.len(), outline.outputs.len());
         let (run, samples) = (&scene.run, scene.run.drive.samples());
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
     use crate::evaluate::trials::world::{RecordNoise, World};
     use crate::record::Drive;
-    use crate::twin::{Noise, Outline, Parameter, Twin};
+    use crate::twin::{Noise, Outline, Parameter, StateSpace, Twin};
     use crate::twins::{CascadedTanks, VanDerPol};
 
     fn structure(twin: Twin, theta: &[f64]) -> Structure {
@@ -208,7 +208,7 @@ mod tests {
         let World::Equations(twin) = &world else {
             panic!("a black box");
         };
-        Structure::of(twin.as_ref(), theta, &scene)
+        Structure::of(twin, theta, &scene)
     }
 
     /// k4 multiplies the pump's input, which enters the upper tank alone; k1 is that tank's, k2 and k3 the lower one's.

@@ -1,21 +1,13 @@
 //! A study in other units of its outputs.
 
-use super::world::World;
 use crate::evaluate::EvaluateError;
-use crate::record::{Drive, Record, Signal};
+use crate::record::Record;
 use crate::study::{Study, StudyFile};
-use crate::twin::{
-    Layout, Modified, Modify, Noise, NoiseLevel, Now, Outliers, Outline, SimulationError,
-    StateSpace,
-};
+use crate::twin::{NoiseLevel, Outline, TwinPart};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// New units in one old one: from metres to millimetres.
 const FACTOR: f64 = 1000.0;
-
-/// Equations whose outputs are read in other units.
-struct Rescaled(Arc<dyn StateSpace>);
 
 /// The study and its records with outputs in other units; `None` for a black box, and for a study with starts, effects, or noise that is
 /// to be estimated.
@@ -25,7 +17,7 @@ pub(super) fn rescaled(
     validation: Option<&Record>,
 ) -> Result<Option<(Study, Record, Option<Record>)>, EvaluateError> {
     let file = study.file();
-    let World::Equations(twin) = World::new(study.twin()) else {
+    let Some(twin) = study.twin().equations() else {
         return Ok(None);
     };
     if !file.start.is_empty() || !file.effect.is_empty() {
@@ -40,7 +32,8 @@ pub(super) fn rescaled(
         library: file.library.clone(),
         ..StudyFile::default()
     };
-    let new = study.with_twin(Modified(Rescaled(twin)))?;
+    let twin = study.twin().with([], vec![TwinPart::Unit(FACTOR)]);
+    let new = study.with_twin(twin)?;
     let kinds = study.catalogue().kinds().iter();
     let new = new.with_effects(kinds.map(|kind| kind.as_ref().clone()));
     let scaled = |record: &Record| Record::new(record.drive().clone(), record.outputs() * FACTOR);
@@ -62,61 +55,12 @@ fn noise(file: &StudyFile, outline: &Outline) -> Option<BTreeMap<String, NoiseLe
     file.noise.iter().map(scaled).collect()
 }
 
-impl Modify for Rescaled {
-    fn base(&self) -> &dyn StateSpace {
-        self.0.as_ref()
-    }
-    fn outline(&self) -> Outline {
-        let mut outline = self.0.outline();
-        for output in &mut outline.outputs {
-            output.unit = format!("{}/{FACTOR}", output.unit);
-        }
-        outline
-    }
-    fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
-        self.0.observe_each(now, at, p, x, y);
-        y.iter_mut().for_each(|y| *y *= FACTOR);
-    }
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.0.noise(now, process, measurement);
-        measurement.iter_mut().for_each(|r| *r *= FACTOR);
-    }
-    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool {
-        y.iter_mut().for_each(|y| *y /= FACTOR);
-        let changed = self.0.readout_each(now, p, y);
-        y.iter_mut().for_each(|y| *y *= FACTOR);
-        changed
-    }
-    fn corrupt_outputs(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
-        *outputs /= FACTOR;
-        self.0.corrupt_outputs(theta, noise, outputs);
-        *outputs *= FACTOR;
-    }
-    fn rounding(&self, theta: &[f64]) -> Vec<f64> {
-        let steps = self.0.rounding(theta);
-        steps.into_iter().map(|step| FACTOR * step).collect()
-    }
-    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
-        let scaled = |o: Outliers| Outliers {
-            scale: FACTOR * o.scale,
-            ..o
-        };
-        self.0.outliers(theta).into_iter().map(scaled).collect()
-    }
-    fn run(
-        whole: &Modified<Self>,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        Ok(whole.0.0.run(theta, drive, noise)? * FACTOR)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::evaluate::paper::reference_studies;
+    use crate::record::{Drive, Signal};
+    use crate::twin::Noise;
 
     fn configured(text: &str) -> Study {
         let file = StudyFile::parse(text, "s.toml".as_ref()).unwrap();

@@ -9,10 +9,10 @@
 //!
 //! is the likeliest to be a motion. A record of it is one of the twin without the law, whose fit is a start beside the law.
 
-use crate::effect::{Effect, Instant, Law, TargetKind, targets};
+use crate::effect::{Effect, Law, TargetKind, targets};
 use crate::hypothesis::term::{Part, Term};
 use crate::record::{Record, Signal};
-use crate::twin::Twin;
+use crate::twin::{Now, Twin};
 
 /// Points at which a law is looked at, over three times what the record spans on both sides of zero.
 const POINTS: usize = 601;
@@ -57,7 +57,7 @@ fn unfolded(effect: &Effect, m: &[f64], record: &Record, output: usize) -> Vec<R
         return vec![];
     }
     let dt = record.drive().dt();
-    let law = |s: f64| law(m, Instant { t: 0.0, dt }, &mut [], s);
+    let law = |s: f64| law.value(m, &Now::new(0.0, dt, &[], &[]), s);
     let shown = record.outputs().column(output).to_vec();
     let present: Vec<usize> = (0..shown.len()).filter(|&k| shown[k].is_finite()).collect();
     let largest = present.iter().fold(0.0, |a: f64, &k| a.max(shown[k].abs()));

@@ -23,12 +23,12 @@ pub(crate) use silent::measured;
 
 use crate::likelihood::kalman::{FilterError, Filtered};
 use crate::record::Record;
-use crate::twin::{DigitalTwin, SimulationError};
+use crate::twin::{ComposedBlackBox, DigitalTwin, SimulationError};
 use runs::Ensemble;
 
 /// Innovations of a record at θ: of a filter where the noise is known, else as an ensemble predicts them.
 pub(crate) fn filtered(
-    twin: &dyn DigitalTwin,
+    twin: &ComposedBlackBox,
     theta: &[f64],
     record: &Record,
 ) -> Result<Filtered, FilterError> {

@@ -173,7 +173,7 @@ mod tests {
                 .unwrap();
             let record = Record::new(drive.clone(), outputs).unwrap();
             let settings = FilterSettings::default();
-            let kalman = Kalman::new(&CascadedTanks, &record, &settings).unwrap();
+            let kalman = Kalman::new(CascadedTanks, &record, &settings).unwrap();
             let best = kalman.filter(&theta).unwrap();
             let ours = {
                 let ensemble = Ensemble::new(&CascadedTanks, &theta, record.drive()).unwrap();
@@ -202,7 +202,7 @@ mod tests {
         }
         let record = Record::new(drive, outputs).unwrap();
         let settings = FilterSettings::default();
-        let best = Kalman::new(&CascadedTanks, &record, &settings)
+        let best = Kalman::new(CascadedTanks, &record, &settings)
             .and_then(|kalman| kalman.filter(&theta))
             .unwrap();
         let ours = crate::likelihood::ensemble::predictor(&CascadedTanks, &theta, &record)

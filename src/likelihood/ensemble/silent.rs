@@ -5,43 +5,55 @@
 
 use super::runs::run;
 use crate::math::{deviation, largest};
-use crate::record::{Drive, Record, Signal, Signals};
+use crate::record::Record;
 use crate::twin::{
-    DigitalTwin, Interval, KnownNoise, Noise, NoisePart, Parameter, ParameterSpace, Role,
-    SimulationError, Twin,
+    ComposedBlackBox, DigitalTwin, Interval, Noise, Parameter, Role, SensorNoise, SimulationError,
+    Twin, TwinPart, WhiteLevel,
 };
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// Least noise of such a twin, as a share of an output's deviation: differences and fits are not good to many more digits.
 const LEAST: f64 = 1e-3;
 /// The same where the simulator has noise of its own: nothing.
 const NONE: f64 = 1e-6;
-/// Values of runs that are kept.
-const KEPT: usize = 2_000_000;
-
 /// The twin as records show it: with measurement noise of a level that is fitted, on top of any noise of its own. Also whether it has
 /// none of its own, so that two runs are alike to the bit.
-pub(crate) fn measured(twin: &Twin, records: &[Record]) -> Result<(Twin, bool), SimulationError> {
-    let (Twin::BlackBox(base), Some(record)) = (twin, records.first()) else {
-        return Ok((twin.clone(), false));
+pub(crate) fn measured(
+    base: &ComposedBlackBox,
+    records: &[Record],
+) -> Result<(Twin, bool), SimulationError> {
+    let Some(record) = records.first() else {
+        return Ok((Twin::BlackBox(base.clone()), false));
     };
-    let theta = twin.parameters().centre();
+    let theta = base.parameters().centre();
     let one = |sample: u64| {
         let noise = Noise::new(0, "silent", sample);
-        run(twin, &theta, record.drive(), noise)
+        run(base, &theta, record.drive(), noise)
     };
     let is_silent = match (one(0)?, one(1)?) {
         (Some(first), Some(second)) => first == second,
         _ => false,
     };
-    let measured = MeasuredBox {
-        base: base.clone(),
-        levels: levels(twin, record, if is_silent { LEAST } else { NONE }),
+    let (parameters, outputs): (Vec<Parameter>, Vec<usize>) =
+        levels(base, record, if is_silent { LEAST } else { NONE })
+            .into_iter()
+            .unzip();
+    let twin = Twin::BlackBox(base.clone());
+    let entries = twin.entries();
+    let levels = (parameters.iter().zip(outputs).enumerate())
+        .map(|(i, (parameter, output))| WhiteLevel {
+            output,
+            entry: entries + i,
+            source: format!("measured/{}", parameter.name),
+        })
+        .collect();
+    let white = TwinPart::White(SensorNoise {
+        levels,
         is_silent,
-        runs: Mutex::default(),
-    };
-    Ok((Twin::BlackBox(Arc::new(measured)), is_silent))
+        entries,
+        runs: Arc::default(),
+    });
+    Ok((twin.with(parameters, vec![white]), is_silent))
 }
 
 /// Deviation, or what is left of it where nothing moves; missing values are left out.
@@ -52,118 +64,30 @@ fn size(values: &[f64]) -> f64 {
     deviation(values).max(least)
 }
 
-fn levels(twin: &dyn DigitalTwin, record: &Record, least: f64) -> Vec<Parameter> {
+/// Levels that are fitted, each with the index of its output.
+fn levels(twin: &ComposedBlackBox, record: &Record, least: f64) -> Vec<(Parameter, usize)> {
     let space = twin.parameters();
     (twin.signals().outputs.iter().enumerate())
         .filter(|(_, output)| space.position(&Role::Noise.name(&output.name)).is_err())
         .map(|(j, output)| {
             let size = size(&record.outputs().column(j).to_vec());
-            Parameter {
+            let parameter = Parameter {
                 name: Role::Noise.name(&output.name),
                 unit: output.unit.clone(),
                 prior: Interval::unchecked(LEAST * size, size),
                 bounds: Interval::unchecked(least * size, 10.0 * size),
                 role: Role::Noise,
-            }
+            };
+            (parameter, j)
         })
         .collect()
-}
-
-/// Runs by θ and drive, and how many values they hold.
-type Kept = (HashMap<Vec<u64>, Arc<Signal>>, usize);
-
-/// A simulator and the noise of its sensors. One run of a simulator without noise serves a whole ensemble.
-struct MeasuredBox {
-    base: Arc<dyn DigitalTwin>,
-    levels: Vec<Parameter>,
-    is_silent: bool,
-    runs: Mutex<Kept>,
-}
-
-impl MeasuredBox {
-    /// The simulator's own parameters, and the noise levels.
-    fn split<'t>(&self, theta: &'t [f64]) -> (&'t [f64], &'t [f64]) {
-        theta.split_at(theta.len() - self.levels.len())
-    }
-
-    fn parts(&self, theta: &[f64]) -> Vec<NoisePart> {
-        let channels = self.signals().outputs;
-        (self.levels.iter().zip(self.split(theta).1))
-            .map(|(parameter, level)| {
-                let channel = channels.iter().position(|o| o.name == parameter.target());
-                let source = format!("measured/{}", parameter.name);
-                NoisePart::white(channel.unwrap_or(0), *level, source)
-            })
-            .collect()
-    }
-
-    fn run(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Arc<Signal>, SimulationError> {
-        if !self.is_silent {
-            return Ok(Arc::new(self.base.simulate(theta, drive, noise)?));
-        }
-        let dt = drive.dt();
-        let numbers = theta.iter().chain([&dt]).chain(drive.inputs());
-        let key: Vec<u64> = numbers
-            .map(|v| v.to_bits())
-            .chain([drive.samples() as u64])
-            .collect();
-        let kept = || self.runs.lock().unwrap_or_else(|e| e.into_inner());
-        if let Some(run) = kept().0.get(&key) {
-            return Ok(run.clone());
-        }
-        let run = Arc::new(self.base.simulate(theta, drive, Noise::OFF)?);
-        let mut kept = kept();
-        if kept.1 > KEPT {
-            *kept = Kept::default();
-        }
-        kept.1 += run.len() + key.len();
-        kept.0.insert(key, run.clone());
-        Ok(run)
-    }
-}
-
-impl DigitalTwin for MeasuredBox {
-    fn parameters(&self) -> ParameterSpace {
-        ParameterSpace::new(self.base.parameters().iter().chain(&self.levels).cloned())
-    }
-    fn signals(&self) -> Signals {
-        self.base.signals()
-    }
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        let (own, _) = self.split(theta);
-        let mean = self.run(own, drive, noise)?.as_ref().clone();
-        let parts = self.parts(theta);
-        Ok(KnownNoise { mean, parts }.draw(noise))
-    }
-    fn known_noise(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-    ) -> Result<Option<KnownNoise>, SimulationError> {
-        if !self.is_silent {
-            return Ok(None);
-        }
-        let (own, _) = self.split(theta);
-        let mean = self.run(own, drive, Noise::OFF)?.as_ref().clone();
-        let parts = self.parts(theta);
-        Ok(Some(KnownNoise { mean, parts }))
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::effect::{Catalogue, augment};
+    use crate::record::{Drive, Signal};
     use crate::twin::fixture::AtOnce;
 
     /// A sensor's lag moves the mean and leaves the noise white; what rounds readings rounds the noise, which is then no longer known.
@@ -173,7 +97,9 @@ mod tests {
         let drive = Drive::new(0.1, u).unwrap();
         let outputs = drive.inputs().mapv(|u| 1.2 * u + 0.1 * (40.0 * u).sin());
         let records = [Record::new(drive.clone(), outputs).unwrap()];
-        let base = Twin::BlackBox(Arc::new(AtOnce::<1>(|a, u| a[0] * u)));
+        let Twin::BlackBox(base) = Twin::new(AtOnce::<1>(|a, u| a[0] * u)) else {
+            unreachable!()
+        };
         let (measured, is_silent) = measured(&base, &records).unwrap();
         assert!(is_silent);
         let with = |id: &str| {
@@ -193,10 +119,14 @@ mod tests {
         );
         let left = run(&lag, &theta, noise) - &lagged - white;
         assert!(left.iter().all(|v| v.abs() < 1e-12));
-        let known = lag.known_noise(&theta, &drive).unwrap().unwrap();
-        assert_eq!(known.mean, lagged);
+        let known = |twin: &Twin, theta: &[f64]| match twin {
+            Twin::BlackBox(twin) => twin.known_noise(theta, &drive).unwrap(),
+            Twin::Equations(_) => None,
+        };
+        let mean = known(&lag, &theta).unwrap().mean;
+        assert_eq!(mean, lagged);
         let rounded = with("sensor-quantization");
-        assert!(rounded.known_noise(&theta, &drive).unwrap().is_none());
+        assert!(known(&rounded, &theta).is_none());
         let rounded = run(&rounded, &theta, noise);
         assert!(
             rounded

@@ -4,7 +4,7 @@ use super::gaussian::Gaussian;
 use super::normal::clip::clip;
 use super::{FilterError, FilterSettings};
 use crate::record::Record;
-use crate::twin::{Interval, ParameterSpace, StateSpace, TwinError};
+use crate::twin::{Composed, Interval, ParameterSpace, TwinError};
 
 /// A filter for many θ on one record: what does not depend on θ is prepared once.
 ///
@@ -39,12 +39,12 @@ use crate::twin::{Interval, ParameterSpace, StateSpace, TwinError};
 /// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
 /// let record = Record::new(drive, outputs)?;
 /// let settings = FilterSettings::default();
-/// let kalman = Kalman::new(&VanDerPol, &record, &settings)?;
+/// let kalman = Kalman::new(VanDerPol, &record, &settings)?;
 /// assert!(kalman.log_likelihood(&[1.5])? > kalman.log_likelihood(&[1.6])?);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Kalman<'a> {
-    pub(super) twin: &'a dyn StateSpace,
+    pub(super) twin: Composed,
     pub(super) record: &'a Record,
     pub(super) settings: &'a FilterSettings,
     pub(super) parameters: ParameterSpace,
@@ -71,10 +71,11 @@ impl<'a> Kalman<'a> {
     ///
     /// [`FilterError::Record`] where the channels differ, or settings that cannot be used.
     pub fn new(
-        twin: &'a dyn StateSpace,
+        twin: impl Into<Composed>,
         record: &'a Record,
         settings: &'a FilterSettings,
     ) -> Result<Self, FilterError> {
+        let twin = twin.into();
         let outline = twin.outline();
         let states = outline.states.len();
         settings.check(states)?;
@@ -82,7 +83,7 @@ impl<'a> Kalman<'a> {
             inputs: outline.inputs,
             outputs: outline.outputs,
         })?;
-        let limits = twin.limits();
+        let limits = twin.limits().to_vec();
         let floor: Vec<f64> = (record.outputs().columns().into_iter())
             .map(|y| settings.noise_floor * scale(y.iter().copied().filter(|v| !v.is_nan())))
             .collect();
@@ -160,7 +161,7 @@ mod tests {
 
     /// Shows its input, without noise.
     struct Through;
-    impl StateSpace for Through {
+    impl crate::twin::StateSpace for Through {
         fn outline(&self) -> Outline {
             Outline::new()
                 .parameter(Parameter::new("none", "1", 0.5, 1.5))
@@ -183,11 +184,9 @@ mod tests {
         let log_likelihood = |values: &dyn Fn(usize) -> f64| {
             let u = Signal::from_shape_fn((200, 1), |(k, _)| values(k));
             let record = Record::new(Drive::new(0.5, u.clone()).unwrap(), u).unwrap();
-            let bare = Kalman::new(&Through, &record, &settings).unwrap();
+            let bare = Kalman::new(Through, &record, &settings).unwrap();
             let bare = bare.log_likelihood(&[1.0]).unwrap();
-            let kalman = Kalman::new(&Through, &record, &settings)
-                .unwrap()
-                .of_cells();
+            let kalman = Kalman::new(Through, &record, &settings).unwrap().of_cells();
             (bare, kalman.log_likelihood(&[1.0]).unwrap())
         };
         let wave = |k: usize| 3.0 * (0.7 * k as f64).sin();

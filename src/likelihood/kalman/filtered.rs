@@ -258,7 +258,7 @@ mod tests {
         let settings = FilterSettings::default();
         let predicted = |outputs: &Signal| {
             let record = Record::new(drive.clone(), outputs.clone()).unwrap();
-            let kalman = Kalman::new(&CascadedTanks, &record, &settings).unwrap();
+            let kalman = Kalman::new(CascadedTanks, &record, &settings).unwrap();
             (
                 kalman.predictions(&theta).unwrap(),
                 kalman.filter(&theta).unwrap(),

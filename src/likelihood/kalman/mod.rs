@@ -26,7 +26,7 @@
 //! let record = Record::new(drive, outputs)?;
 //!
 //! let settings = FilterSettings::default();
-//! let kalman = Kalman::new(&CascadedTanks, &record, &settings)?;
+//! let kalman = Kalman::new(CascadedTanks, &record, &settings)?;
 //! let right = kalman.filter(&theta)?;
 //! let wrong = kalman.filter(&[0.6, 0.5, 0.7, 1.0])?;
 //! assert!(right.log_likelihood > wrong.log_likelihood + 10.0);
@@ -36,8 +36,8 @@
 //! # Limits
 //!
 //! The state is described by a mean and a covariance: distributions with two humps are not. Noise levels must not
-//! depend on the state. Outliers ([`StateSpace::outliers`](crate::twin::StateSpace::outliers)) make the density of a row
-//! a mixture, rounding ([`StateSpace::rounding`](crate::twin::StateSpace::rounding)) its mean over a cell; what follows from either for the
+//! depend on the state. Outliers make the density of a row
+//! a mixture, rounding its mean over a cell; what follows from either for the
 //! state is again a mean and a covariance.
 
 mod coordinates;

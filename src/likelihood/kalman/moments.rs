@@ -19,7 +19,7 @@ use super::number::{Buffers, Call, FilterNumber, MovingPoints};
 use super::size::{Buffer, Size};
 use super::{Kalman, Method, linearised};
 use crate::math::{Condition, Kernel, Number, widest};
-use crate::twin::{Interval, Now, StateSpace};
+use crate::twin::{Composed, Interval, Now};
 use std::f64::consts::SQRT_2;
 
 /// √3: points of the three-point Gauss–Hermite rule, in standard deviations.
@@ -40,7 +40,7 @@ pub(super) type Moment<'w, N> = (&'w mut [N], &'w mut [N]);
 /// Buffers of one filter run: n states, p outputs.
 pub(super) struct Moments<'a, S: Size, N: FilterNumber> {
     size: S,
-    twin: &'a dyn StateSpace,
+    twin: &'a Composed,
     method: Method,
     limits: &'a [Interval],
     /// Limits of points that give a derivative.
@@ -63,11 +63,11 @@ impl<'a, S: Size, N: FilterNumber> Moments<'a, S, N> {
         let (n, p) = (size.states(), size.outputs());
         Self {
             size,
-            twin: kalman.twin,
+            twin: &kalman.twin,
             method: kalman.settings.method,
             limits: &kalman.limits,
             unlimited: vec![Interval::EVERYTHING; n],
-            buffers: Buffers::new(kalman.twin, n),
+            buffers: Buffers::new(&kalman.twin, n),
             shifts: S::Vector::zeros(n),
             points: vec![N::ZERO; (1 + 4 * n) * n],
             outputs: vec![N::ZERO; (1 + 2 * n) * p],
@@ -228,7 +228,7 @@ impl<'a, S: Size, N: FilterNumber> Moments<'a, S, N> {
             now,
             buffers: &mut self.buffers,
         };
-        N::observe(call, n, p, points, outputs);
+        N::observe(call, n, points, outputs);
         if method == Method::Extended {
             let (at, derivatives) = (&self.at.numbers()[..n], &mut self.derivatives);
             linearised::slopes(at, root, p, outputs, derivatives);

@@ -1,7 +1,7 @@
 //! Calls of the twin by a filter, whose numbers are one or those of several filters side by side. The twin's equations are plain f64.
 
 use crate::math::{Lanes, Mask, Number};
-use crate::twin::{Interval, LanePoints, Layout, Now, Points, StateSpace, Workspace};
+use crate::twin::{Composed, Interval, LanePoints, Now, Points, Workspace};
 
 /// States of filters that run side by side, at most.
 pub(super) const MOST_STATES: usize = 4;
@@ -10,20 +10,20 @@ pub(super) const MOST_STATES: usize = 4;
 pub(super) trait FilterNumber: Number {
     /// Puts points into the limits and carries them over a step; the lanes in which a constraint acted.
     fn advance(call: Call<'_, '_>, points: MovingPoints<'_, Self>) -> Self::Condition;
-    /// Outputs, `p` each, of points of `n` states each.
-    fn observe(call: Call<'_, '_>, n: usize, p: usize, points: &[Self], outputs: &mut [Self]);
+    /// Outputs of points of `n` states each.
+    fn observe(call: Call<'_, '_>, n: usize, points: &[Self], outputs: &mut [Self]);
     /// Noise levels; both come with any numbers.
     fn noise(at: Asked<'_, '_>, process: &mut [Self], measurement: &mut [Self]);
-    /// Puts outputs, `p` each, through the readout; the lanes in which it changed any.
-    fn readout(at: Asked<'_, '_>, p: usize, outputs: &mut [Self]) -> Self::Condition;
+    /// Puts outputs through the readout; the lanes in which it changed any.
+    fn readout(at: Asked<'_, '_>, outputs: &mut [Self]) -> Self::Condition;
 }
 
 /// A twin, and where its filters are: one view for each lane in use.
-pub(super) type Asked<'c, 'n> = (&'c dyn StateSpace, &'c [Now<'n>]);
+pub(super) type Asked<'c, 'n> = (&'c Composed, &'c [Now<'n>]);
 
 /// The same, with buffers.
 pub(super) struct Call<'c, 'n> {
-    pub twin: &'c dyn StateSpace,
+    pub twin: &'c Composed,
     pub now: &'c [Now<'n>],
     pub buffers: &'c mut Buffers,
 }
@@ -36,9 +36,9 @@ pub(super) struct Buffers {
 }
 
 impl Buffers {
-    pub fn new(twin: &dyn StateSpace, n: usize) -> Self {
+    pub fn new(twin: &Composed, n: usize) -> Self {
         Self {
-            work: Workspace::new(twin),
+            work: twin.workspace(),
             one: vec![0.0; (1 + 4 * n) * n],
             shift: vec![0.0; n],
         }
@@ -62,11 +62,11 @@ impl FilterNumber for f64 {
             limits: points.limits,
             shifts: points.shifts,
         };
-        (call.twin).advance_each(&call.now[0], points, &mut call.buffers.work)
+        (call.twin).advance(&call.now[0], points, &mut call.buffers.work)
     }
     #[inline(always)]
-    fn observe(call: Call<'_, '_>, n: usize, p: usize, points: &[f64], outputs: &mut [f64]) {
-        (call.twin).observe_each(&call.now[0], Layout::dense(n), p, points, outputs);
+    fn observe(call: Call<'_, '_>, _: usize, points: &[f64], outputs: &mut [f64]) {
+        call.twin.observe(&call.now[0], points, outputs);
     }
     #[inline(always)]
     fn noise((twin, now): Asked<'_, '_>, process: &mut [f64], measurement: &mut [f64]) {
@@ -75,8 +75,8 @@ impl FilterNumber for f64 {
         twin.noise(&now[0], process, measurement);
     }
     #[inline(always)]
-    fn readout((twin, now): Asked<'_, '_>, p: usize, outputs: &mut [f64]) -> bool {
-        twin.readout_each(&now[0], p, outputs)
+    fn readout((twin, now): Asked<'_, '_>, outputs: &mut [f64]) -> bool {
+        twin.readout(&now[0], outputs)
     }
 }
 
@@ -96,7 +96,7 @@ impl FilterNumber for Lanes {
         Mask::of(|lane| bent[lane])
     }
     #[inline(always)]
-    fn observe(call: Call<'_, '_>, n: usize, _: usize, points: &[Self], outputs: &mut [Self]) {
+    fn observe(call: Call<'_, '_>, n: usize, points: &[Self], outputs: &mut [Self]) {
         let buffer = &mut call.buffers.one;
         call.twin
             .observe_lanes(call.now, n, points, outputs, buffer);
@@ -106,7 +106,7 @@ impl FilterNumber for Lanes {
         twin.noise_lanes(now, process, &mut measurement[0]);
     }
     #[inline(always)]
-    fn readout((twin, now): Asked<'_, '_>, _: usize, outputs: &mut [Self]) -> Mask {
+    fn readout((twin, now): Asked<'_, '_>, outputs: &mut [Self]) -> Mask {
         let changed = twin.readout_lanes(now, outputs);
         Mask::of(|lane| changed[lane])
     }

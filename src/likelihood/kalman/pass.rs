@@ -148,7 +148,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         let (n, p) = (size.states(), size.outputs());
         let FilterJob { kalman, order, .. } = jobs[0];
         let readings: Vec<Option<Readings>> = (jobs.iter())
-            .map(|job| Readings::of(kalman.twin, job.theta))
+            .map(|job| Readings::of(&kalman.twin, job.theta))
             .collect();
         let mut floor = S::Vector::zeros(p);
         for (j, floor) in floor.numbers_mut()[..p].iter_mut().enumerate() {
@@ -166,9 +166,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             jobs,
             kalman,
             order,
-            now: (jobs.iter())
-                .map(|job| job.acting.at(0, job.theta))
-                .collect(),
+            now: (jobs.iter()).map(|job| job.acting.at(0)).collect(),
             copy: FilterState::zero(n),
             moments: Moments::new(size, kalman),
             update: Update::new(size),
@@ -268,7 +266,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             &mut self.q.numbers_mut()[..n],
             &mut self.r.numbers_mut()[..p],
         );
-        N::noise((self.kalman.twin, &self.now), q, r);
+        N::noise((&self.kalman.twin, &self.now), q, r);
     }
 
     /// Puts row i into the state.
@@ -336,7 +334,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         let predicted = &mut self.predicted.numbers_mut()[..p];
         let outputs = (self.moments).observe(&self.now, mean, root, predicted);
         let row = MeasuredRow {
-            at: (self.kalman.twin, &self.now),
+            at: (&self.kalman.twin, &self.now),
             y: &self.y.numbers()[..p],
             predicted,
             noise: &self.r.numbers()[..p],

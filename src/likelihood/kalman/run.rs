@@ -14,7 +14,7 @@ impl Kalman<'_> {
         let drive = self.record.drive();
         self.check(theta)?;
         self.twin.check_parameters(theta, drive.dt())?;
-        Ok(Acting::of(self.twin, theta, drive)?)
+        Ok(Acting::of(&self.twin, theta, drive)?)
     }
 
     /// The first state; `cov` comes zeroed.
@@ -28,7 +28,7 @@ impl Kalman<'_> {
         self.twin.start(now, mean);
         match &self.start_covariance {
             Some(covariance) => cov.copy_from_slice(covariance),
-            None if !spread_start(self.twin, now, mean, cov) => return,
+            None if !spread_start(&self.twin, now, mean, cov) => return,
             None => {}
         }
         clip(mean, cov, &self.limits, scale);

@@ -6,6 +6,7 @@ use crate::twin::*;
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 
 /// Two coupled masses pushed by u; with one output, or the second state and the sum too.
+#[derive(Clone)]
 struct Chain {
     outputs: usize,
     ceiling: f64,
@@ -139,14 +140,14 @@ fn agrees_with_the_exact_filter(twin: &Chain, record: &Record) {
                 keep_states: true,
                 ..FilterSettings::default()
             };
-            let found = Kalman::new(twin, record, &settings)
+            let found = Kalman::new(twin.clone(), record, &settings)
                 .and_then(|k| k.filter(&theta))
                 .unwrap();
             let error = found.log_likelihood - expected.log_likelihood;
             assert!(error.abs() < 1e-8, "{method:?}: {error}");
             let sum: f64 = found.log_densities.iter().sum();
             assert!((sum - found.log_likelihood).abs() < 1e-9);
-            let fast = Kalman::new(twin, record, &settings)
+            let fast = Kalman::new(twin.clone(), record, &settings)
                 .and_then(|k| k.log_likelihood(&theta))
                 .unwrap();
             assert_eq!(fast, found.log_likelihood);
@@ -157,7 +158,7 @@ fn agrees_with_the_exact_filter(twin: &Chain, record: &Record) {
                     "{y}"
                 );
             }
-            let smoothed = Kalman::new(twin, record, &settings)
+            let smoothed = Kalman::new(twin.clone(), record, &settings)
                 .and_then(|k| k.smooth(&theta))
                 .unwrap();
             for (states, expected) in [
@@ -240,7 +241,7 @@ fn a_missing_output_has_no_score() {
         let twin = Chain::new(outputs);
         let record = with_gaps(&with_steps(&twin, &record(&twin, &[1.2, 0.3])), 0.5);
         let settings = FilterSettings::default();
-        let kalman = Kalman::new(&twin, &record, &settings).unwrap();
+        let kalman = Kalman::new(twin.clone(), &record, &settings).unwrap();
         let score = Score::at(&kalman, &[1.2, 0.3]).unwrap();
         let empty = |k: usize| record.outputs().row(k).iter().all(|y| y.is_nan());
         assert!((0..record.samples()).any(empty));
@@ -259,7 +260,7 @@ fn a_missing_output_has_no_score() {
 fn a_known_start_leaves_the_measurement_noise() {
     let twin = Chain::new(2);
     let record = record(&twin, &[1.0, 0.0]);
-    let found = Kalman::new(&twin, &record, &FilterSettings::default())
+    let found = Kalman::new(twin.clone(), &record, &FilterSettings::default())
         .and_then(|k| k.filter(&[1.0, 0.0]))
         .unwrap();
     let variances = found.variances();
@@ -278,7 +279,7 @@ fn the_score_is_the_derivative_of_the_log_likelihood() {
     let twin = Chain::new(1);
     let record = record(&twin, &[1.2, 0.3]);
     let settings = FilterSettings::default();
-    let kalman = Kalman::new(&twin, &record, &settings).unwrap();
+    let kalman = Kalman::new(twin.clone(), &record, &settings).unwrap();
     let known = DMatrix::zeros(2, 2);
     let value = |k: f64, offset: f64| {
         let a = exact_likelihood(&twin, &[k, offset], &record, &known);
@@ -341,7 +342,7 @@ fn information_is_the_covariance_of_the_score() {
             let noise = Noise::new(4, "information", run.into());
             let outputs = twin.simulate(&theta, &drive, noise).unwrap();
             let record = Record::new(drive, outputs).unwrap();
-            let kalman = Kalman::new(&twin, &record, &settings).unwrap();
+            let kalman = Kalman::new(twin.clone(), &record, &settings).unwrap();
             let score = Score::at(&kalman, &theta).unwrap();
             fisher += &score.fisher / f64::from(n);
             squares += &score.gradient * score.gradient.transpose() / f64::from(n);
@@ -372,7 +373,7 @@ fn a_saturating_sensor_is_known_to_saturate() {
             outputs: 1,
             ceiling,
         };
-        Kalman::new(&twin, &record, &settings)
+        Kalman::new(twin.clone(), &record, &settings)
             .and_then(|k| k.log_likelihood(&theta))
             .unwrap()
     };
@@ -391,7 +392,7 @@ fn what_does_not_fit_is_named() {
     let theta = [1.2, 0.3];
     let fitting = record(&twin, &theta);
     let settings = FilterSettings::default();
-    let short = Kalman::new(&twin, &fitting, &settings)
+    let short = Kalman::new(twin.clone(), &fitting, &settings)
         .and_then(|k| k.log_likelihood(&[1.0]))
         .unwrap_err();
     assert!(
@@ -399,14 +400,14 @@ fn what_does_not_fit_is_named() {
         "{short}"
     );
     let other = Chain::new(2);
-    let error = Kalman::new(&other, &fitting, &settings)
+    let error = Kalman::new(other, &fitting, &settings)
         .and_then(|k| k.log_likelihood(&theta))
         .unwrap_err();
     assert!(
         error.to_string().contains("1 outputs, the twin has 2"),
         "{error}"
     );
-    let error = Kalman::new(&twin, &fitting, &settings)
+    let error = Kalman::new(twin.clone(), &fitting, &settings)
         .and_then(|k| k.log_likelihood(&[1e200, 0.0]))
         .unwrap_err();
     assert!(error.is_recoverable(), "{error}");

@@ -7,7 +7,7 @@ use super::normal::cell::Cell;
 use super::number::{Asked, FilterNumber};
 use super::size::{Buffer, Size};
 use crate::math::{Condition, Number};
-use crate::twin::{Outliers, StateSpace};
+use crate::twin::{Composed, Outliers};
 
 /// Nodes and weights of the Gauss–Hermite rule with five points, for a standard normal.
 const NODES: [(f64, f64); 5] = [
@@ -82,7 +82,7 @@ pub(super) struct Readings {
 
 impl Readings {
     /// Those of a twin at θ; `None` where it has neither.
-    pub fn of(twin: &dyn StateSpace, theta: &[f64]) -> Option<Self> {
+    pub fn of(twin: &Composed, theta: &[f64]) -> Option<Self> {
         let (rounding, outliers) = (twin.rounding(theta), twin.outliers(theta));
         let any = !(rounding.is_empty() && outliers.is_empty());
         any.then_some(Self { rounding, outliers })
@@ -267,12 +267,12 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
             place(read, node);
         }
         // Where the outermost are not bent, nothing between them is.
-        let bent = N::readout(row.at, p, outermost);
+        let bent = N::readout(row.at, outermost);
         if bent.any() {
             for (read, node) in inner.chunks_exact_mut(p).zip(&NODES[2..]) {
                 place(read, *node);
             }
-            N::readout(row.at, p, inner);
+            N::readout(row.at, inner);
         }
         bent
     }

@@ -1,11 +1,12 @@
 //! Fitted noise levels: what is declared, or guessed from the records.
 
-use super::equations::{MeasuredEquations, Source};
 use crate::effect::stops;
 use crate::record::Record;
-use crate::twin::{Interval, Modified, Now, Outline, Parameter, Role, StateSpace, Twin, is_memory};
+use crate::twin::{
+    Composed, FittedLevels, Interval, LevelSource, Now, Outline, Parameter, Role, Twin, TwinPart,
+    is_memory,
+};
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 /// Standard deviation of the logarithm of a level that nothing is declared of: within a factor of 50 at two of them. Half of it ties
 /// rigs to this file's guesses of size; twice costs a nat a level, for all explanations alike.
@@ -64,7 +65,7 @@ pub(crate) struct Measured {
 
 /// The twin with these sizes of states and outputs.
 pub(super) fn build(
-    base: &Arc<dyn StateSpace>,
+    base: &Composed,
     outline: &Outline,
     records: &[Record],
     beliefs: &Beliefs,
@@ -73,15 +74,13 @@ pub(super) fn build(
     outputs: &[f64],
 ) -> Measured {
     let (n, p) = (outline.states.len(), outline.outputs.len());
-    let mut noisy = MeasuredEquations {
-        base: base.clone(),
-        outline: outline.clone(),
-        own: outline.parameters.len(),
+    let mut noisy = FittedLevels {
         step: beliefs.step,
-        process: vec![Source::Declared; n],
-        measurement: vec![Source::Declared; p],
-        starts: vec![None; n],
+        process: vec![LevelSource::Declared; n],
+        measurement: vec![LevelSource::Declared; p],
     };
+    let mut starts = vec![];
+    let twin = Twin::Equations(base.clone());
     let now = Now::new(0.0, beliefs.step, records[0].drive().input(0), theta);
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     base.noise(&now, &mut q, &mut r);
@@ -116,7 +115,7 @@ pub(super) fn build(
             deviation,
             loud: bounds.clamp(loud.max(median)),
         });
-        Some(outline.parameters.len() + levels.len() - 1)
+        Some(twin.entries() + levels.len() - 1)
     };
     for (i, state) in outline.states.iter().enumerate() {
         if is_memory(&state.name) {
@@ -130,14 +129,12 @@ pub(super) fn build(
         let declared = q[i] / beliefs.step.sqrt();
         let guess = WANDER * sizes[i] / longest.sqrt();
         let loud = LOUD * sizes[i] / step.sqrt();
-        if let Some(parameter) = add(&state.name, unit, 0.0, declared, guess, loud) {
-            noisy.process[i] = Source::Fitted {
-                parameter,
-                declared,
-            };
+        if let Some(entry) = add(&state.name, unit, 0.0, declared, guess, loud) {
+            noisy.process[i] = LevelSource::Fitted { entry, declared };
         }
         if !beliefs.starts.contains(&state.name) {
-            noisy.starts[i] = Some(sizes[i]);
+            let (state, std) = (i, sizes[i]);
+            starts.push(TwinPart::UncertainStart { state, std });
         }
     }
     for (j, output) in outline.outputs.iter().enumerate() {
@@ -151,18 +148,15 @@ pub(super) fn build(
         } else {
             f64::MIN_POSITIVE
         };
-        if let Some(parameter) = add(&output.name, unit, floor, r[j], guess, loud) {
-            noisy.measurement[j] = Source::Fitted {
-                parameter,
-                declared: r[j],
-            };
+        let declared = r[j];
+        if let Some(entry) = add(&output.name, unit, floor, declared, guess, loud) {
+            noisy.measurement[j] = LevelSource::Fitted { entry, declared };
         }
     }
-    for level in &levels {
-        noisy.outline.parameters.push(level.parameter.clone());
-    }
+    let parameters = levels.iter().map(|level| level.parameter.clone());
+    starts.push(TwinPart::Levels(noisy));
     Measured {
-        twin: Twin::Equations(Arc::new(Modified(noisy))),
+        twin: twin.with(parameters, starts),
         levels,
         is_silent: false,
     }

@@ -10,7 +10,6 @@
 //! x(0) ~ N(start, d²)                              d declared, or the size of the state's own motion
 //! ```
 
-mod equations;
 mod level;
 mod motion;
 #[cfg(test)]
@@ -21,11 +20,10 @@ pub(crate) use level::{Beliefs, Level, Measured};
 use super::ensemble;
 use super::kalman::FilterError;
 use crate::record::Record;
-use crate::twin::{StateSpace, Twin, TwinError, fix};
+use crate::twin::{Composed, Twin, TwinError, fix};
 use level::build;
 use motion::{followed_motion, free_motion, size};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// The twin as these records show it. A black box has noise of its own, or is given that of a sensor.
 pub(crate) fn measured(
@@ -35,8 +33,8 @@ pub(crate) fn measured(
 ) -> Result<Measured, FilterError> {
     match twin {
         Twin::Equations(base) => measured_equations(base, records, beliefs),
-        Twin::BlackBox(_) => {
-            let (twin, is_silent) = ensemble::measured(twin, records)?;
+        Twin::BlackBox(base) => {
+            let (twin, is_silent) = ensemble::measured(base, records)?;
             Ok(Measured {
                 twin,
                 levels: vec![],
@@ -82,7 +80,7 @@ pub(crate) fn with_levels(
 }
 
 fn measured_equations(
-    base: &Arc<dyn StateSpace>,
+    base: &Composed,
     records: &[Record],
     beliefs: &Beliefs,
 ) -> Result<Measured, FilterError> {
@@ -95,7 +93,7 @@ fn measured_equations(
         .map(|j| size_of(&|r| r.outputs().column(j).to_vec()))
         .collect();
     let fallback = outputs.iter().copied().fold(0.0, f64::max);
-    let mut sizes = free_motion(base.as_ref(), records, &theta, fallback);
+    let mut sizes = free_motion(base, records, &theta, fallback);
     // States that follow the record tell their size better than a run that may drift away from it.
     let loud = build(base, &outline, records, beliefs, &theta, &sizes, &outputs);
     if let Some(followed) = followed_motion(&loud, records, &theta)? {

@@ -4,7 +4,7 @@ use super::level::Measured;
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::math::deviation;
 use crate::record::Record;
-use crate::twin::{Acting, StateSpace, Workspace};
+use crate::twin::{Acting, Composed};
 
 /// Deviation, or what is left of it where nothing moves.
 pub(super) fn size(values: &[f64]) -> f64 {
@@ -17,7 +17,7 @@ pub(super) fn size(values: &[f64]) -> f64 {
 /// Median distance of each state from its start, in runs under the records' inputs; `fallback` where a state does not move or the
 /// run diverges.
 pub(super) fn free_motion(
-    base: &dyn StateSpace,
+    base: &Composed,
     records: &[Record],
     theta: &[f64],
     fallback: f64,
@@ -25,20 +25,20 @@ pub(super) fn free_motion(
     let n = base.outline().states.len();
     let limits = base.limits();
     let mut distances = vec![Vec::new(); n];
-    let mut work = Workspace::new(base);
+    let mut work = base.workspace();
     for record in records {
         let drive = record.drive();
         let Ok(acting) = Acting::of(base, theta, drive) else {
             continue;
         };
         let (mut x, mut start) = (vec![0.0; n], vec![0.0; n]);
-        base.start(&acting.at(0, theta), &mut x);
+        base.start(&acting.at(0), &mut x);
         start.copy_from_slice(&x);
         for k in 0..drive.samples() {
-            let now = acting.at(k, theta);
-            base.advance(&now, &mut x, &mut work);
+            let now = acting.at(k);
+            base.step(&now, &mut x, &mut work);
             base.constrain(&now, &mut x);
-            for (x, limit) in x.iter_mut().zip(&limits) {
+            for (x, limit) in x.iter_mut().zip(limits) {
                 *x = limit.clamp(*x);
             }
             if !x.iter().all(|v| v.abs() < 1e12) {

@@ -15,11 +15,11 @@ fn record(twin: &dyn DigitalTwin, theta: &[f64], drive: Drive) -> Record {
     Record::new(drive, outputs).unwrap()
 }
 
-fn tanks() -> (Arc<dyn StateSpace>, Record) {
+fn tanks() -> (Composed, Record) {
     let inputs = Signal::from_shape_fn((200, 1), |(k, _)| [2.6, 0.4, 2.0, 1.2][k / 30 % 4]);
     let drive = Drive::new(0.5, inputs).unwrap();
     let record = record(&CascadedTanks, &[0.6, 0.5, 0.55, 1.0], drive);
-    (Arc::new(CascadedTanks), record)
+    (CascadedTanks.into(), record)
 }
 
 fn medians(measured: &Measured) -> impl Iterator<Item = f64> {
@@ -64,7 +64,7 @@ fn declared_levels_are_the_twins_own() {
 #[test]
 fn undeclared_levels_come_from_the_record() {
     let record = record(&VanDerPol, &[1.5], Drive::autonomous(0.05, 300).unwrap());
-    let twin: Arc<dyn StateSpace> = Arc::new(VanDerPol);
+    let twin = Composed::from(VanDerPol);
     let held = Beliefs {
         known: ["x2".to_owned()].into(),
         starts: ["x1".to_owned()].into(),

@@ -4,14 +4,13 @@ mod level;
 
 pub(crate) use level::{NoiseLevel, Per, StartLevel};
 
-use super::fix::{Held, HeldBlackBox};
+use super::composed::Setting;
 use crate::record::Quantity;
 use crate::twin::{
-    DigitalTwin, Interval, Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role,
-    StateSpace, Twin, TwinError, is_memory,
+    Composed, Interval, Now, Outline, Parameter, ParameterSpace, Role, Twin, TwinError, TwinPart,
+    is_memory,
 };
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// A new setting of a twin; each map goes by the names of parameters, states and outputs.
 ///
@@ -37,10 +36,14 @@ pub(crate) fn adapt(base: Twin, adaptation: &Adaptation, step: f64) -> Result<Tw
     if *adaptation == Adaptation::default() {
         return Ok(base);
     }
-    match base {
-        Twin::Equations(base) => adapt_equations(base, adaptation, step),
-        Twin::BlackBox(base) => adapt_black_box(base, adaptation),
-    }
+    let twin = match &base {
+        Twin::Equations(equations) => adapt_equations(&base, equations, adaptation, step)?,
+        Twin::BlackBox(_) => {
+            check_black_box(adaptation)?;
+            base
+        }
+    };
+    twin.with_space(|space| rebox(space, adaptation))
 }
 
 /// The twin begun at known states, each within its limits; `None` for a black box.
@@ -63,7 +66,7 @@ pub(crate) fn begun(twin: &Twin, states: &[f64], step: f64) -> Option<Twin> {
     adapt(twin.clone(), &adaptation, step).ok()
 }
 
-fn adapt_black_box(base: Arc<dyn DigitalTwin>, adaptation: &Adaptation) -> Result<Twin, TwinError> {
+fn check_black_box(adaptation: &Adaptation) -> Result<(), TwinError> {
     for (table, used) in [
         ("limits", !adaptation.limits.is_empty()),
         ("noise", !adaptation.noise.is_empty()),
@@ -73,91 +76,67 @@ fn adapt_black_box(base: Arc<dyn DigitalTwin>, adaptation: &Adaptation) -> Resul
             return Err(TwinError::BlackBox(table));
         }
     }
-    let mut parameters = base.parameters();
-    rebox(&mut parameters, adaptation)?;
-    let held = Held::none(parameters.len());
-    Ok(Twin::BlackBox(Arc::new(HeldBlackBox {
-        base,
-        parameters,
-        held,
-    })))
+    Ok(())
 }
 
 fn adapt_equations(
-    base: Arc<dyn StateSpace>,
+    twin: &Twin,
+    base: &Composed,
     adaptation: &Adaptation,
     step: f64,
 ) -> Result<Twin, TwinError> {
-    let mut outline = base.outline();
-    let own = outline.parameters.len();
+    let outline = base.outline();
     let names = |all: &[Quantity]| -> Vec<String> { all.iter().map(|q| q.name.clone()).collect() };
     let states = names(&outline.states);
     let noisy = [&states[..], &names(&outline.outputs)].concat();
-    let mut limits = base.limits();
-    for (index, _, limit) in indexed("limits", &adaptation.limits, &states)? {
-        limits[index] = limit;
+    let mut limits = base.limits().to_vec();
+    let (mut added, mut parts) = (vec![], vec![]);
+    for (state, _, limit) in indexed("limits", &adaptation.limits, &states)? {
+        limits[state] = limit;
+        parts.push(TwinPart::Box { state, limit });
     }
     let noise = indexed("noise", &adaptation.noise, &noisy)?;
-    let levels = declared_noise(base.as_ref(), &outline, step);
+    let levels = declared_noise(base, &outline, step);
     for &(index, name, level) in &noise {
         level.check(name)?;
-        if level == NoiseLevel::Estimate {
-            let level = levels[index];
-            let guess = (level > 0.0).then(|| Interval::unchecked(0.1 * level, 3.0 * level));
-            let parameter = unknown(adaptation, Role::Noise, name, guess)?;
-            if parameter.prior.low() < 0.0 || parameter.bounds.low() < 0.0 {
-                let low = parameter.prior.low().min(parameter.bounds.low());
-                return Err(TwinError::Value {
-                    table: "prior",
-                    name: parameter.name,
-                    value: low,
-                    remedy: "a noise level is a standard deviation: its prior and bounds begin at 0 or above",
-                });
+        let is_process = index < states.len();
+        let setting = match level {
+            NoiseLevel::Declared { std, per, .. } => Setting::Known(match per {
+                Per::Second if is_process => std * step.sqrt(),
+                _ => std,
+            }),
+            NoiseLevel::Estimate => {
+                let level = levels[index];
+                let guess = (level > 0.0).then(|| Interval::unchecked(0.1 * level, 3.0 * level));
+                added.push(unknown_level(adaptation, name, guess)?);
+                Setting::Parameter(twin.entries() + added.len() - 1)
             }
-            outline.parameters.push(parameter);
-        }
+        };
+        parts.push(TwinPart::Level {
+            is_process,
+            target: if is_process {
+                index
+            } else {
+                index - states.len()
+            },
+            level: setting,
+            step,
+        });
     }
-    let start = indexed("start", &adaptation.start, &states)?;
-    for &(index, name, level) in &start {
-        let limit = limits[index];
+    for (state, name, level) in indexed("start", &adaptation.start, &states)? {
+        let limit = limits[state];
         level.check(name, limit)?;
-        if level == StartLevel::Estimate {
-            let guess = Some(limit).filter(|limit| limit.is_finite());
-            let parameter = unknown(adaptation, Role::Start, name, guess)?;
-            outline.parameters.push(parameter);
-        }
+        let (mean, std) = match level {
+            StartLevel::Declared { mean, std } => (Setting::Known(mean), std),
+            StartLevel::Estimate => {
+                let guess = Some(limit).filter(|limit| limit.is_finite());
+                added.push(unknown(adaptation, Role::Start, name, guess)?);
+                (Setting::Parameter(twin.entries() + added.len() - 1), 0.0)
+            }
+        };
+        parts.push(TwinPart::Start { state, mean, std });
     }
-    rebox(&mut outline.parameters, adaptation)?;
-    let place = |role: Role, name: &str| outline.parameters.position(&role.name(name));
-    let noise = (noise.iter())
-        .map(|&(index, name, level)| {
-            let at_step = match level {
-                NoiseLevel::Declared { std, per, .. } => Setting::Known(match per {
-                    Per::Second if index < states.len() => std * step.sqrt(),
-                    _ => std,
-                }),
-                NoiseLevel::Estimate => Setting::Parameter(place(Role::Noise, name)?),
-            };
-            Ok((index, at_step))
-        })
-        .collect::<Result<Vec<_>, TwinError>>()?;
-    let start = (start.iter())
-        .map(|&(index, name, level)| {
-            Ok(match level {
-                StartLevel::Declared { mean, std } => (index, Setting::Known(mean), std),
-                StartLevel::Estimate => (index, Setting::Parameter(place(Role::Start, name)?), 0.0),
-            })
-        })
-        .collect::<Result<Vec<_>, TwinError>>()?;
-    Ok(Twin::Equations(Arc::new(Modified(Adapted {
-        limits,
-        noise,
-        start,
-        step,
-        own,
-        outline,
-        base,
-    }))))
+    Ok(twin.with(added, parts))
 }
 
 /// Entries of a table, each with the index of its name among those that the twin knows.
@@ -179,7 +158,7 @@ fn indexed<'a, T: Copy>(
 }
 
 /// Noise levels of states, then outputs, at the prior's centre.
-fn declared_noise(twin: &dyn StateSpace, outline: &Outline, step: f64) -> Vec<f64> {
+fn declared_noise(twin: &Composed, outline: &Outline, step: f64) -> Vec<f64> {
     let (mut process, mut measurement) = (
         vec![0.0; outline.states.len()],
         vec![0.0; outline.outputs.len()],
@@ -190,6 +169,25 @@ fn declared_noise(twin: &dyn StateSpace, outline: &Outline, step: f64) -> Vec<f6
     twin.noise(&now, &mut process, &mut measurement);
     process.extend(measurement);
     process
+}
+
+/// A parameter for an unknown noise level of `target`.
+fn unknown_level(
+    adaptation: &Adaptation,
+    target: &str,
+    guess: Option<Interval>,
+) -> Result<Parameter, TwinError> {
+    let parameter = unknown(adaptation, Role::Noise, target, guess)?;
+    let low = parameter.prior.low().min(parameter.bounds.low());
+    if low < 0.0 {
+        return Err(TwinError::Value {
+            table: "prior",
+            name: parameter.name,
+            value: low,
+            remedy: "a noise level is a standard deviation: its prior and bounds begin at 0 or above",
+        });
+    }
+    Ok(parameter)
 }
 
 /// A parameter for an unknown start or noise level of `target`.
@@ -220,74 +218,4 @@ fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(),
         parameters[index].bounds = bounds;
     }
     parameters.check()
-}
-
-/// A start or noise level.
-#[derive(Debug, Clone, Copy)]
-enum Setting {
-    Known(f64),
-    /// Index in θ.
-    Parameter(usize),
-}
-
-impl Setting {
-    fn value(self, theta: &[f64]) -> f64 {
-        match self {
-            Self::Known(value) => value,
-            Self::Parameter(index) => theta[index],
-        }
-    }
-}
-
-/// Equations in another setting.
-struct Adapted {
-    base: Arc<dyn StateSpace>,
-    outline: Outline,
-    limits: Vec<Interval>,
-    /// Index among states, then outputs; a state's level is that of the increment in `step`.
-    noise: Vec<(usize, Setting)>,
-    /// Index, mean, standard deviation.
-    start: Vec<(usize, Setting, f64)>,
-    /// Step of the study, in seconds.
-    step: f64,
-    /// Length of the base twin's θ.
-    own: usize,
-}
-
-impl Modify for Adapted {
-    fn base(&self) -> &dyn StateSpace {
-        self.base.as_ref()
-    }
-    fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
-        then(&theta[..self.own])
-    }
-    fn outline(&self) -> Outline {
-        self.outline.clone()
-    }
-    fn limits(&self) -> Vec<Interval> {
-        self.limits.clone()
-    }
-    fn start(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.now(now, |now| self.base.start(now, x));
-        for &(i, mean, _) in &self.start {
-            x[i] = mean.value(now.theta);
-        }
-    }
-    fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]) {
-        self.now(now, |now| self.base.start_deviation(now, std));
-        for &(i, _, deviation) in &self.start {
-            std[i] = deviation;
-        }
-    }
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.now(now, |now| self.base.noise(now, process, measurement));
-        for &(i, setting) in &self.noise {
-            let value = setting.value(now.theta);
-            match i.checked_sub(process.len()) {
-                // Variances add up over time: another step is not another physics.
-                None => process[i] = value * (now.dt / self.step).sqrt(),
-                Some(j) => measurement[j] = value,
-            }
-        }
-    }
 }

@@ -3,7 +3,7 @@
 use super::finding::Finding;
 use crate::math::{deviation, three_digits};
 use crate::record::{Drive, Signal};
-use crate::twin::{MOST_SUBSTEPS, Noise, Now, SimulationError, StateSpace, Twin};
+use crate::twin::{Composed, MOST_SUBSTEPS, Noise, Now, SimulationError, Twin};
 
 /// Largest error of the step where no noise is declared, as a share of an output's deviation.
 const STEP_SHARE: f64 = 0.01;
@@ -72,7 +72,7 @@ pub(crate) fn coarse_step(
 
 /// Limit of each output's move, and the limit's name.
 fn step_levels(
-    twin: &dyn StateSpace,
+    twin: &Composed,
     theta: &[f64],
     drive: &Drive,
 ) -> Result<Vec<(f64, &'static str)>, SimulationError> {
@@ -98,7 +98,7 @@ fn step_levels(
 
 /// Root mean square of what noise adds to each output.
 fn scatter(
-    twin: &dyn StateSpace,
+    twin: &Composed,
     theta: &[f64],
     drive: &Drive,
     run: &Signal,

@@ -8,7 +8,7 @@ use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record, Signal, Signals};
 use truetwin::study::Study;
 use truetwin::twin::{
-    DigitalTwin, Noise, Now, Outline, ParameterSpace, SimulationError, StateSpace, Twin,
+    Composed, DigitalTwin, Noise, Now, Outline, ParameterSpace, SimulationError, StateSpace, Twin,
 };
 
 pub fn study(name: &str) -> Study {
@@ -254,7 +254,7 @@ pub struct Unlisted {
 pub const UNLISTED: usize = 4;
 
 impl Unlisted {
-    fn inner(&self) -> &dyn StateSpace {
+    fn inner(&self) -> &Composed {
         self.base.equations().unwrap()
     }
 }
@@ -303,7 +303,7 @@ impl StateSpace for Unlisted {
         self.inner().noise(now, process, measurement);
     }
     fn limits(&self) -> Vec<truetwin::twin::Interval> {
-        self.inner().limits()
+        self.inner().limits().to_vec()
     }
 }
 

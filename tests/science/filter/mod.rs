@@ -7,7 +7,7 @@ mod van_der_pol;
 use nalgebra::DVector;
 use truetwin::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
 use truetwin::record::{Drive, Record};
-use truetwin::twin::{DigitalTwin, Noise, StateSpace};
+use truetwin::twin::{Composed, DigitalTwin, Noise};
 
 /// A record of `twin` at `theta`, number `run`.
 fn record(twin: &dyn DigitalTwin, theta: &[f64], drive: Drive, run: u64) -> Record {
@@ -23,7 +23,7 @@ fn mean(values: &[f64]) -> f64 {
 
 /// Maximum likelihood by Fisher scoring, halved until it climbs; θ and its standard errors.
 fn maximum_likelihood(
-    twin: &dyn StateSpace,
+    twin: impl Into<Composed>,
     record: &Record,
     start: &[f64],
 ) -> (Vec<f64>, Vec<f64>) {

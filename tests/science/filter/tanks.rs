@@ -43,7 +43,7 @@ fn innovations_are_white_with_unit_variance() {
         .into_par_iter()
         .map(|run| {
             let record = simulated(&CENTRE, run);
-            let found = Kalman::new(&CascadedTanks, &record, &settings)
+            let found = Kalman::new(CascadedTanks, &record, &settings)
                 .and_then(|k| k.filter(&CENTRE))
                 .unwrap();
             found.standardised.iter().copied().collect()
@@ -74,7 +74,7 @@ const CORNERS: [[f64; 4]; 4] = [
 
 fn log_likelihood_by(method: Method, theta: &[f64], record: &Record) -> f64 {
     let settings = FilterSettings::default().with_method(method);
-    Kalman::new(&CascadedTanks, record, &settings)
+    Kalman::new(CascadedTanks, record, &settings)
         .and_then(|kalman| kalman.log_likelihood(theta))
         .unwrap()
 }
@@ -178,7 +178,7 @@ fn noise_levels_are_parameters() {
 fn effects_that_are_off_leave_the_likelihood() {
     let record = simulated(&CENTRE, 3);
     let settings = FilterSettings::default();
-    let base = Kalman::new(&CascadedTanks, &record, &settings)
+    let base = Kalman::new(CascadedTanks, &record, &settings)
         .and_then(|k| k.log_likelihood(&CENTRE))
         .unwrap();
     let library = Catalogue::default();
@@ -216,7 +216,7 @@ fn effects_that_are_off_leave_the_likelihood() {
     let known = Kalman::new(equations, &spilled, &settings)
         .and_then(|k| k.log_likelihood(&theta))
         .unwrap();
-    let unknown = Kalman::new(&CascadedTanks, &spilled, &settings)
+    let unknown = Kalman::new(CascadedTanks, &spilled, &settings)
         .and_then(|k| k.log_likelihood(&CENTRE))
         .unwrap();
     assert!(known > unknown + 10.0, "{known} {unknown}");
@@ -238,7 +238,7 @@ fn outliers_are_a_mixture() {
             let record = record(&twin, &truth, levels(run), run);
             let kalman = Kalman::new(equations, &record, &settings).unwrap();
             let plain = kalman.log_likelihood(&with([0.0, 1.5])).unwrap();
-            let base = Kalman::new(&CascadedTanks, &record, &settings)
+            let base = Kalman::new(CascadedTanks, &record, &settings)
                 .and_then(|k| k.log_likelihood(&CENTRE))
                 .unwrap();
             assert_eq!(plain, base);
@@ -290,10 +290,10 @@ fn smoothing_brings_levels_closer() {
         let (drive, noise) = (levels(run), Noise::new(1, "filter", run));
         let truth = Levels.simulate(&CENTRE, &drive, noise).unwrap();
         let record = simulated(&CENTRE, run);
-        let filtered = Kalman::new(&CascadedTanks, &record, &settings)
+        let filtered = Kalman::new(CascadedTanks, &record, &settings)
             .and_then(|k| k.filter(&CENTRE))
             .unwrap();
-        let smoothed = Kalman::new(&CascadedTanks, &record, &settings)
+        let smoothed = Kalman::new(CascadedTanks, &record, &settings)
             .and_then(|k| k.smooth(&CENTRE))
             .unwrap();
         let squares = |means: &Signal| (&truth - means).mapv(|e| e * e).mean().unwrap();
@@ -322,7 +322,7 @@ fn threads_change_no_bit() {
         pool.install(|| {
             (records.par_iter())
                 .map(|record| {
-                    Kalman::new(&CascadedTanks, record, &settings)
+                    Kalman::new(CascadedTanks, record, &settings)
                         .and_then(|k| k.log_likelihood(&CENTRE))
                         .unwrap()
                 })

@@ -34,7 +34,7 @@ fn likelihood_and_score_are_the_closed_form() {
         let record = simulated(nu, run);
         for method in [Method::Points, Method::Extended] {
             let settings = FilterSettings::default().with_method(method);
-            let kalman = Kalman::new(&VanDerPol, &record, &settings).unwrap();
+            let kalman = Kalman::new(VanDerPol, &record, &settings).unwrap();
             let filtered = kalman.filter(&[nu]).unwrap();
             let (value, _, information, best) = closed_form(&record, nu);
             let last: f64 = filtered.log_densities[2..].iter().sum();
@@ -58,7 +58,7 @@ fn maximum_likelihood_is_efficient() {
     let (mut squares, mut expected, mut exact) = (vec![], vec![], vec![]);
     for run in 0..60 {
         let record = simulated(3.0, 100 + run);
-        let (theta, _) = maximum_likelihood(&VanDerPol, &record, &[2.5]);
+        let (theta, _) = maximum_likelihood(VanDerPol, &record, &[2.5]);
         let (.., information, best) = closed_form(&record, 3.0);
         squares.push((theta[0] - 3.0).powi(2));
         expected.push(1.0 / information);
@@ -79,7 +79,7 @@ fn maximum_likelihood_is_efficient() {
 #[test]
 fn smoothed_speeds_are_differences_of_positions() {
     let record = simulated(1.0, 7);
-    let smoothed = Kalman::new(&VanDerPol, &record, &FilterSettings::default())
+    let smoothed = Kalman::new(VanDerPol, &record, &FilterSettings::default())
         .and_then(|k| k.smooth(&[1.0]))
         .unwrap();
     let y = record.outputs();

@@ -334,7 +334,7 @@ impl<'a> TruthSampler<'a> {
     fn true_places(&self, truth: &Truth, scene: &Scene) -> Vec<String> {
         let mut all = truth.targets.clone();
         if let World::Equations(twin) = &self.world {
-            let structure = Structure::of(twin.as_ref(), &truth.theta, scene);
+            let structure = Structure::of(twin, &truth.theta, scene);
             for departure in &truth.departures {
                 let same = structure.same_as(departure.place).into_iter();
                 all.extend(same.map(|place| self.places.name(place).to_owned()));

@@ -4,12 +4,12 @@ use super::{RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, Moment, above};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::record::{Drive, Signal};
-use crate::twin::{Acting, DeadTime, Interval, Noise, Now, StateSpace};
+use crate::twin::{Acting, Composed, DeadTime, Interval, Noise, Now};
 use ndarray::ArrayView1;
 
 /// Makes a record; `None` where a state diverges.
 pub(super) fn run(
-    twin: &dyn StateSpace,
+    twin: &Composed,
     system: System<'_>,
     drive: &Drive,
     draws: RecordNoise,
@@ -21,7 +21,7 @@ pub(super) fn run(
         twin,
         departures: system.departures,
         memories: vec![vec![]; system.departures.len()],
-        limits: twin.limits(),
+        limits: twin.limits().to_vec(),
         stage: vec![0.0; n],
         slopes: vec![vec![0.0; n]; 4],
     };
@@ -99,7 +99,7 @@ pub(super) fn run(
             return None;
         }
     }
-    twin.corrupt_outputs(system.theta, draws.measurement, &mut outputs);
+    twin.finish(system.theta, draws.measurement, &mut outputs);
     conditions.empty(&mut outputs, draws.process);
     Some(WorldRun {
         drive: drive.with_inputs(inputs).ok()?,
@@ -112,14 +112,14 @@ pub(super) fn run(
 /// Inputs as departures leave them, on their way through the twin's own actuators. A controller answers row by row, so that they are not
 /// known before.
 struct Sent<'w> {
-    twin: &'w dyn StateSpace,
+    twin: &'w Composed,
     theta: &'w [f64],
     /// The rows so far; none where the twin's inputs act as they are.
     drive: Option<Drive>,
 }
 
 impl<'w> Sent<'w> {
-    fn new(twin: &'w dyn StateSpace, theta: &'w [f64], drive: &Drive) -> Option<Self> {
+    fn new(twin: &'w Composed, theta: &'w [f64], drive: &Drive) -> Option<Self> {
         let actuated = twin.actuated(theta, drive).ok()?;
         Some(Self {
             twin,
@@ -144,7 +144,7 @@ impl<'w> Sent<'w> {
 
 /// Equations with departures, and the memories of these.
 struct Plant<'w> {
-    twin: &'w dyn StateSpace,
+    twin: &'w Composed,
     departures: &'w [Departure],
     memories: Vec<Vec<f64>>,
     limits: Vec<Interval>,
@@ -157,7 +157,7 @@ impl Plant<'_> {
     fn begin(&self, system: System<'_>, drive: &Drive, noise: Noise, x: &mut [f64]) -> Option<()> {
         (self.twin.check_parameters(system.theta, drive.dt())).ok()?;
         let acting = Acting::of(self.twin, system.theta, drive).ok()?;
-        let now = acting.at(0, system.theta);
+        let now = acting.at(0);
         self.twin.start(&now, x);
         let mut deviation = vec![0.0; x.len()];
         self.twin.start_deviation(&now, &mut deviation);
@@ -310,7 +310,7 @@ mod tests {
 
     /// ẋ = −k·x + u, y = x, with noise.
     struct Decay(f64);
-    impl StateSpace for Decay {
+    impl crate::twin::StateSpace for Decay {
         fn outline(&self) -> Outline {
             Outline::new()
                 .parameter(Parameter::new("k", "1/s", 0.2, 2.0))
@@ -346,7 +346,13 @@ mod tests {
             departures,
             conditions,
         };
-        run(&Decay(noise), system, &drive, draws(Noise::new(1, "w", 0))).unwrap()
+        run(
+            &Decay(noise).into(),
+            system,
+            &drive,
+            draws(Noise::new(1, "w", 0)),
+        )
+        .unwrap()
     }
 
     /// Without noise and departures a world is its twin as far as the twin's integrator goes.
@@ -383,7 +389,13 @@ mod tests {
             departures: &[],
             conditions: &conditions,
         };
-        let run = run(&Decay(0.01), system, &drive, draws(Noise::new(1, "w", 0))).unwrap();
+        let run = run(
+            &Decay(0.01).into(),
+            system,
+            &drive,
+            draws(Noise::new(1, "w", 0)),
+        )
+        .unwrap();
         let tail: Vec<f64> = run.outputs.iter().copied().skip(500).collect();
         let variance = crate::math::deviation(&tail).powi(2);
         let expected = (0.02f64).powi(2) / (1.0 - (-0.14f64).exp());

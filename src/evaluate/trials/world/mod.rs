@@ -11,14 +11,13 @@ pub(super) use conditions::{Conditions, Feedback, NuisanceKind};
 
 use super::law::Departure;
 use crate::record::{Drive, Signal};
-use crate::twin::{DigitalTwin, Noise, StateSpace, Twin};
-use std::sync::Arc;
+use crate::twin::{Composed, ComposedBlackBox, Noise, Twin};
 
 /// A twin that records are made with.
 #[derive(Clone)]
 pub(super) enum World {
-    Equations(Arc<dyn StateSpace>),
-    BlackBox(Arc<dyn DigitalTwin>),
+    Equations(Composed),
+    BlackBox(ComposedBlackBox),
 }
 
 /// The truth of one record.
@@ -96,8 +95,8 @@ impl World {
     /// Makes a record; `None` where the system diverges.
     pub fn run(&self, system: System<'_>, drive: &Drive, draws: RecordNoise) -> Option<WorldRun> {
         match self {
-            Self::Equations(twin) => equations::run(twin.as_ref(), system, drive, draws),
-            Self::BlackBox(twin) => black_box::run(twin.as_ref(), system, drive, draws),
+            Self::Equations(twin) => equations::run(twin, system, drive, draws),
+            Self::BlackBox(twin) => black_box::run(twin, system, drive, draws),
         }
     }
 }

@@ -1,34 +1,30 @@
 //! Outputs with a dead time, beside a register of states.
 
+use crate::effect::{Catalogue, Effect, EffectKind, augment};
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{DigitalTwin, Noise, Now, Outline, Parameter, StateSpace};
+use crate::twin::{Noise, Now, Outline, Parameter, StateSpace, Twin, fix};
 
 const LATE: usize = 6;
+const STEP: f64 = 0.2;
 
-/// A leak that is pushed, seen by one sensor at once and by another one some samples later: by a dead time, or by a register of states.
-struct Leak {
-    register: usize,
-}
+/// A leak that is pushed, seen by two sensors.
+struct Leak;
 
 impl StateSpace for Leak {
     fn outline(&self) -> Outline {
-        let outline = Outline::new()
+        Outline::new()
             .parameter(Parameter::new("rate", "1/s", 0.1, 2.0))
             .state("x", "m")
             .input("u", "m/s")
             .output("now", "m")
-            .output("later", "m");
-        (0..self.register).fold(outline, |outline, i| {
-            outline.state(&format!("past{i}"), "m")
-        })
+            .output("later", "m")
     }
     fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        dx.fill(0.0);
         dx[0] = now.u[0] - now.theta[0] * x[0];
     }
     fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        y.copy_from_slice(&[x[0], x[self.register]]);
+        y.fill(x[0]);
     }
     fn start(&self, _: &Now<'_>, x: &mut [f64]) {
         x.fill(1.0);
@@ -36,47 +32,54 @@ impl StateSpace for Leak {
     fn start_deviation(&self, _: &Now<'_>, std: &mut [f64]) {
         std[0] = 0.5;
     }
-    fn begin(&self, _: &Now<'_>, x: &mut [f64]) {
-        let first = x[0];
-        x.fill(first);
-    }
     fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
         process[0] = 0.3;
         measurement.copy_from_slice(&[0.4, 0.1]);
     }
-    fn update(&self, _: &Now<'_>, x: &mut [f64]) {
-        x.rotate_right(1);
-        x[0] = x[usize::from(self.register > 0)];
-    }
-    fn dead_time(&self, _: &[f64], _: f64) -> Vec<usize> {
-        match self.register {
-            0 => vec![0, LATE],
-            _ => vec![],
-        }
-    }
 }
 
-const DEAD_TIME: Leak = Leak { register: 0 };
-const REGISTER: Leak = Leak { register: LATE };
+/// The leak whose second sensor shows it some samples later, by an effect.
+fn late(effect: &Effect) -> Twin {
+    let twin = augment(Twin::new(Leak), vec![effect.clone()]).unwrap();
+    fix(twin, &effect.given_by_parameter().collect()).unwrap()
+}
+
+fn by_dead_time() -> Twin {
+    let delay = Catalogue::default().effect("sensor-delay", "sensor2");
+    late(&delay.unwrap().hold("delay", LATE as f64 * STEP))
+}
+
+fn by_register() -> Twin {
+    let register = EffectKind::sensor("register", "", |_, _, past, s| {
+        past.rotate_right(1);
+        past[0] = s;
+        past[LATE]
+    });
+    let register = register.memory(LATE + 1);
+    let library = Catalogue::default().with(register);
+    late(&library.effect("register", "sensor2").unwrap())
+}
 
 fn record(seed: u64) -> Record {
     let inputs = Signal::from_shape_fn((90, 1), |(k, _)| (0.3 * k as f64).sin());
-    let drive = Drive::new(0.2, inputs).unwrap();
-    let outputs = DEAD_TIME.simulate(&[0.7], &drive, Noise::new(seed, "late", 0));
+    let drive = Drive::new(STEP, inputs).unwrap();
+    let outputs = by_dead_time().simulate(&[0.7], &drive, Noise::new(seed, "late", 0));
     Record::new(drive, outputs.unwrap()).unwrap()
 }
 
-fn with<T>(twin: &Leak, record: &Record, then: impl FnOnce(&Kalman<'_>) -> T) -> T {
+fn with<T>(twin: &Twin, record: &Record, then: impl FnOnce(&Kalman<'_>) -> T) -> T {
     let settings = FilterSettings::default();
-    then(&Kalman::new(twin, record, &settings).unwrap())
+    then(&Kalman::new(twin.equations().unwrap(), record, &settings).unwrap())
 }
 
 /// A linear twin: both filters are exact, so that all values together have one density, the first ones and missing ones included.
 #[test]
 fn a_dead_time_is_a_register_of_states() {
     let whole = record(1);
-    let run = |twin: &Leak| twin.free_run(&[0.7], whole.drive()).unwrap();
-    assert_eq!(run(&DEAD_TIME), run(&REGISTER));
+    let (dead_time, register) = (by_dead_time(), by_register());
+    let run = |twin: &Twin| twin.free_run(&[0.7], whole.drive()).unwrap();
+    let difference = run(&dead_time) - run(&register);
+    assert!(difference.iter().all(|d| d.abs() < 1e-12));
     let mut outputs = whole.outputs().clone();
     for (k, j) in [(2, 1), (40, 0), (41, 0), (41, 1), (88, 1)] {
         outputs[[k, j]] = f64::NAN;
@@ -84,8 +87,8 @@ fn a_dead_time_is_a_register_of_states() {
     let gappy = Record::new(whole.drive().clone(), outputs).unwrap();
     for record in [&whole, &gappy] {
         for theta in [[0.7], [1.1]] {
-            let expected = with(&REGISTER, record, |k| k.filter(&theta).unwrap());
-            let found = with(&DEAD_TIME, record, |k| k.filter(&theta).unwrap());
+            let expected = with(&register, record, |k| k.filter(&theta).unwrap());
+            let found = with(&dead_time, record, |k| k.filter(&theta).unwrap());
             let error = found.log_likelihood - expected.log_likelihood;
             assert!(error.abs() < 1e-8, "{error}");
             let sum: f64 = found.log_densities.iter().sum();
@@ -94,15 +97,15 @@ fn a_dead_time_is_a_register_of_states() {
                 assert_eq!(y.is_nan(), found.innovations[cell] == 0.0, "{cell:?}");
             }
         }
-        let score = |twin: &Leak| {
+        let score = |twin: &Twin| {
             with(twin, record, |k| {
                 Score::forward(k, &[0.9], &Coordinates::new(k.parameters())).unwrap()
             })
         };
-        let (own, register) = (score(&DEAD_TIME), score(&REGISTER));
-        let error = own.gradient[0] - register.gradient[0];
+        let (own, expected) = (score(&dead_time), score(&register));
+        let error = own.gradient[0] - expected.gradient[0];
         assert!(
-            error.abs() < 1e-3 * register.fisher[(0, 0)].sqrt(),
+            error.abs() < 1e-3 * expected.fisher[(0, 0)].sqrt(),
             "{error}"
         );
     }
@@ -113,14 +116,15 @@ fn a_dead_time_is_a_register_of_states() {
 #[test]
 fn predictions_do_not_see_the_future() {
     let whole = record(2);
-    let all = with(&DEAD_TIME, &whole, |k| k.predictions(&[0.7]).unwrap());
+    let dead_time = by_dead_time();
+    let all = with(&dead_time, &whole, |k| k.predictions(&[0.7]).unwrap());
     for from in [0, 3, LATE, 20, 60, 88] {
         let mut outputs = whole.outputs().clone();
         outputs
             .slice_mut(ndarray::s![from.., ..])
             .mapv_inplace(|y| y + 5.0);
         let other = Record::new(whole.drive().clone(), outputs).unwrap();
-        let other = with(&DEAD_TIME, &other, |k| k.predictions(&[0.7]).unwrap());
+        let other = with(&dead_time, &other, |k| k.predictions(&[0.7]).unwrap());
         for k in 0..=from {
             assert_eq!(all.row(k), other.row(k), "row {k} of {from}");
         }
@@ -131,7 +135,9 @@ fn predictions_do_not_see_the_future() {
         [0, 1].map(|j| squares.column(j).sum())
     };
     let own = error(&all);
-    let best = error(&with(&REGISTER, &whole, |k| k.predictions(&[0.7]).unwrap()));
+    let best = error(&with(&by_register(), &whole, |k| {
+        k.predictions(&[0.7]).unwrap()
+    }));
     for ((own, best), most) in own.iter().zip(best).zip([1.3, 2.0]) {
         assert!((0.95..most).contains(&(own / best)), "{own} of {best}");
     }

@@ -49,7 +49,7 @@ impl Kalman<'_> {
     pub(super) fn fits_beside(&self, other: &Self) -> bool {
         let is_same = std::ptr::eq(self, other);
         is_same
-            || std::ptr::addr_eq(self.twin, other.twin)
+            || self.twin.is(&other.twin)
                 && self.settings.method == other.settings.method
                 && self.record.samples() == other.record.samples()
                 && !(self.gaps || other.gaps)
@@ -66,7 +66,7 @@ pub(super) fn together(all: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
     let orders: Vec<Option<Order<'_>>> = (all.iter())
         .map(|&(kalman, theta)| {
             let order = Order::of(kalman, theta).ok()?;
-            let is_plain = Readings::of(kalman.twin, theta).is_none() && order.before == 0;
+            let is_plain = Readings::of(&kalman.twin, theta).is_none() && order.before == 0;
             is_plain.then_some(order)
         })
         .collect();

@@ -4,7 +4,7 @@ use super::*;
 use crate::effect::{Catalogue, augment};
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Score};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{DigitalTwin, Noise, StateSpace};
+use crate::twin::{Composed, Noise};
 use crate::twins::{CascadedTanks, VanDerPol};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -16,8 +16,11 @@ fn tanks_drive() -> Drive {
     Drive::new(0.5, levels).unwrap()
 }
 
-fn record(twin: &dyn StateSpace, theta: &[f64], drive: &Drive, run: u64) -> Record {
-    let outputs = twin.run(theta, drive, Noise::new(1, "lanes", run)).unwrap();
+fn record(twin: impl Into<Composed>, theta: &[f64], drive: &Drive, run: u64) -> Record {
+    let outputs = twin
+        .into()
+        .run(theta, drive, Noise::new(1, "lanes", run))
+        .unwrap();
     Record::new(drive.clone(), outputs).unwrap()
 }
 
@@ -36,7 +39,7 @@ fn thetas(centre: &[f64]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn agree(twin: &dyn StateSpace, centre: &[f64], record: &Record, settings: &FilterSettings) {
+fn agree(twin: impl Into<Composed>, centre: &[f64], record: &Record, settings: &FilterSettings) {
     let kalman = Kalman::new(twin, record, settings).unwrap().of_cells();
     let thetas = thetas(centre);
     let all: Vec<_> = thetas.iter().map(|theta| (&kalman, &theta[..])).collect();
@@ -61,30 +64,30 @@ fn lanes_are_the_scalar_pass() {
     let settings = FilterSettings::default();
     let free = Drive::autonomous(0.05, 200).unwrap();
     agree(
-        &VanDerPol,
+        VanDerPol,
         &[1.5],
-        &record(&VanDerPol, &[1.5], &free, 0),
+        &record(VanDerPol, &[1.5], &free, 0),
         &settings,
     );
-    let measured = record(&CascadedTanks, &CENTRE, &tanks_drive(), 0);
-    agree(&CascadedTanks, &CENTRE, &measured, &settings);
+    let measured = record(CascadedTanks, &CENTRE, &tanks_drive(), 0);
+    agree(CascadedTanks, &CENTRE, &measured, &settings);
     // An unknown start at the floor, where the limit is felt.
     let spread = FilterSettings {
         start_covariance: Some(DMatrix::from_diagonal_element(2, 2, 0.3)),
         ..FilterSettings::default()
     };
-    agree(&CascadedTanks, &CENTRE, &measured, &spread);
+    agree(CascadedTanks, &CENTRE, &measured, &spread);
     // Every third output missing.
     let outputs = Signal::from_shape_fn((150, 1), |(k, _)| match k % 3 {
         1 => f64::NAN,
         _ => measured.outputs()[[k, 0]],
     });
     let gaps = Record::new(tanks_drive(), outputs).unwrap();
-    agree(&CascadedTanks, &CENTRE, &gaps, &settings);
+    agree(CascadedTanks, &CENTRE, &gaps, &settings);
     // Values on levels, which hold the noise up.
     let levels = measured.outputs().mapv(|y| (y / 0.7).round() * 0.7);
     let rounded = Record::new(tanks_drive(), levels).unwrap();
-    agree(&CascadedTanks, &CENTRE, &rounded, &settings);
+    agree(CascadedTanks, &CENTRE, &rounded, &settings);
 }
 
 /// A ceiling acts on some lanes and not on others; a lag adds a state; a forces law acts on each point.
@@ -99,20 +102,19 @@ fn lanes_of_twins_with_effects_are_the_scalar_pass() {
     let lag = library.effect("sensor-lag", "sensor").unwrap();
     let drag = library.effect("quadratic-drag", "h1").unwrap();
     for (effect, magnitudes) in [(ceiling, &[3.0, 0.5][..]), (lag, &[1.2]), (drag, &[0.05])] {
-        let twin: Arc<dyn DigitalTwin> =
-            Arc::new(augment(Arc::new(CascadedTanks), vec![effect]).unwrap());
+        let twin = augment(Arc::new(CascadedTanks), vec![effect]).unwrap();
         let twin = twin.equations().unwrap();
         let centre = [&CENTRE[..], magnitudes].concat();
-        let measured = record(twin.as_ref(), &centre, &tanks_drive(), 1);
-        agree(twin.as_ref(), &centre, &measured, &settings);
+        let measured = record(twin, &centre, &tanks_drive(), 1);
+        agree(twin, &centre, &measured, &settings);
     }
 }
 
 #[test]
 fn a_score_by_lanes_is_that_of_single_passes() {
-    let measured = record(&CascadedTanks, &CENTRE, &tanks_drive(), 0);
+    let measured = record(CascadedTanks, &CENTRE, &tanks_drive(), 0);
     let settings = FilterSettings::default();
-    let kalman = Kalman::new(&CascadedTanks, &measured, &settings).unwrap();
+    let kalman = Kalman::new(CascadedTanks, &measured, &settings).unwrap();
     let coordinates = Coordinates::new(kalman.parameters());
     let one = Score::forward_one_by_one(&kalman, &CENTRE, &coordinates).unwrap();
     let lanes = Score::forward(&kalman, &CENTRE, &coordinates).unwrap();
@@ -130,8 +132,7 @@ fn no_lane_changes_a_bit_of_another() {
         .effect("state-ceiling", "h1")
         .unwrap()
         .with_other("h2");
-    let twin: Arc<dyn DigitalTwin> =
-        Arc::new(augment(Arc::new(CascadedTanks), vec![ceiling]).unwrap());
+    let twin = augment(Arc::new(CascadedTanks), vec![ceiling]).unwrap();
     let twin = twin.equations().unwrap();
     let theta = [&CENTRE[..], &[3.0, 0.5]].concat();
     let records: Vec<Record> = (0..11)
@@ -139,11 +140,11 @@ fn no_lane_changes_a_bit_of_another() {
             let drive = tanks_drive();
             let inputs = drive.inputs() * (0.1 + 0.2 * run as f64);
             let drive = drive.with_inputs(inputs).unwrap();
-            record(twin.as_ref(), &theta, &drive, run)
+            record(twin, &theta, &drive, run)
         })
         .collect();
     let kalmans: Vec<Kalman<'_>> = (records.iter())
-        .map(|record| Kalman::new(twin.as_ref(), record, &settings).unwrap())
+        .map(|record| Kalman::new(twin, record, &settings).unwrap())
         .collect();
     let coordinates = Coordinates::new(kalmans[0].parameters());
     let all = Score::forward_all(&kalmans, &theta, &coordinates);
@@ -157,8 +158,8 @@ fn no_lane_changes_a_bit_of_another() {
 #[test]
 fn what_lanes_do_not_hold_is_run_one_by_one() {
     let settings = FilterSettings::default();
-    let measured = record(&CascadedTanks, &CENTRE, &tanks_drive(), 0);
-    let kalman = Kalman::new(&CascadedTanks, &measured, &settings).unwrap();
+    let measured = record(CascadedTanks, &CENTRE, &tanks_drive(), 0);
+    let kalman = Kalman::new(CascadedTanks, &measured, &settings).unwrap();
     let coordinates = Coordinates::new(kalman.parameters());
     let lanes = together(&[(&kalman, &[f64::NAN; 4]), (&kalman, &CENTRE)]).unwrap();
     assert_eq!(lanes.lane(0), None);
@@ -168,12 +169,11 @@ fn what_lanes_do_not_hold_is_run_one_by_one() {
     let saturated = Catalogue::default()
         .effect("sensor-saturation", "sensor")
         .unwrap();
-    let twin: Arc<dyn DigitalTwin> =
-        Arc::new(augment(Arc::new(CascadedTanks), vec![saturated]).unwrap());
+    let twin = augment(Arc::new(CascadedTanks), vec![saturated]).unwrap();
     let twin = twin.equations().unwrap();
     let theta = [&CENTRE[..], &[0.0, 2.0]].concat();
-    let measured = record(twin.as_ref(), &theta, &tanks_drive(), 0);
-    let kalman = Kalman::new(twin.as_ref(), &measured, &settings).unwrap();
+    let measured = record(twin, &theta, &tanks_drive(), 0);
+    let kalman = Kalman::new(twin, &measured, &settings).unwrap();
     assert!(together(&[(&kalman, &theta)]).is_some());
     let coordinates = Coordinates::new(kalman.parameters());
     let one = Score::forward_one_by_one(&kalman, &theta, &coordinates).unwrap();

@@ -1,16 +1,14 @@
 //! The one trait that every simulator has.
 
-mod known_noise;
-
-pub(crate) use known_noise::{KnownNoise, NoisePart};
-
 use crate::record::{Drive, Signal, Signals};
-use crate::twin::{Noise, ParameterSpace, SimulationError, StateSpace};
+#[cfg(doc)]
+use crate::twin::StateSpace;
+use crate::twin::{Composed, Noise, ParameterSpace, SimulationError};
 use std::sync::Arc;
 
 /// A simulator of a physical system: parameters and inputs in, outputs out.
 ///
-/// Two methods make a black box a twin. A simulator whose equations are at hand implements [`StateSpace`]
+/// Two methods make a black box a twin. A simulator whose equations are at hand implements [`StateSpace`](crate::twin::StateSpace)
 /// instead and is a `DigitalTwin` by that.
 ///
 /// # What an implementation owes
@@ -70,37 +68,35 @@ pub trait DigitalTwin: Send + Sync {
     ///
     /// As [`simulate`](Self::simulate).
     fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
-        let mut mean = Signal::zeros((drive.samples(), self.signals().outputs.len()));
-        for sample in 0..FREE_RUNS {
-            let run = self.simulate(theta, drive, Noise::new(0, "free run", sample))?;
-            if run.dim() != mean.dim() {
-                return Err(SimulationError::fatal(format!(
-                    "the twin gave {:?} rows and columns, {:?} were expected",
-                    run.dim(),
-                    mean.dim()
-                )));
-            }
-            mean += &run;
-        }
-        Ok(mean / FREE_RUNS as f64)
-    }
-
-    /// Outputs where their noise is known, so that a likelihood needs no ensemble of runs: of a simulator without noise, whose records
-    /// have that of their sensors. For twins of this crate.
-    #[doc(hidden)]
-    fn known_noise(
-        &self,
-        _theta: &[f64],
-        _drive: &Drive,
-    ) -> Result<Option<KnownNoise>, SimulationError> {
-        Ok(None)
+        mean_run(self, theta, drive)
     }
 
     /// The equations, of a twin that shows them; none by default.
-    fn equations(self: Arc<Self>) -> Option<Arc<dyn StateSpace>> {
+    fn equations(self: Arc<Self>) -> Option<Composed> {
         None
     }
 }
 
+/// Returns the mean of runs, each with noise of its own.
+pub(super) fn mean_run(
+    twin: &(impl DigitalTwin + ?Sized),
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<Signal, SimulationError> {
+    let mut mean = Signal::zeros((drive.samples(), twin.signals().outputs.len()));
+    for sample in 0..FREE_RUNS {
+        let run = twin.simulate(theta, drive, Noise::new(0, "free run", sample))?;
+        if run.dim() != mean.dim() {
+            return Err(SimulationError::fatal(format!(
+                "the twin gave {:?} rows and columns, {:?} were expected",
+                run.dim(),
+                mean.dim()
+            )));
+        }
+        mean += &run;
+    }
+    Ok(mean / FREE_RUNS as f64)
+}
+
 /// Runs that a black box's free run is the mean of.
-pub(super) const FREE_RUNS: u64 = 32;
+pub(in crate::twin) const FREE_RUNS: u64 = 32;

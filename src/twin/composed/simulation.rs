@@ -1,38 +1,8 @@
 //! The loop that simulates equations.
 
-use crate::record::{Drive, Signal, Signals};
-use crate::twin::{
-    Acting, DigitalTwin, Interval, Noise, Now, Outline, ParameterSpace, SimulationError,
-    StateSpace, Workspace,
-};
-use std::sync::Arc;
-
-impl<T: StateSpace + 'static> DigitalTwin for T {
-    fn parameters(&self) -> ParameterSpace {
-        self.outline().parameters
-    }
-
-    fn signals(&self) -> Signals {
-        self.outline().signals()
-    }
-
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        self.run(theta, drive, noise)
-    }
-
-    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
-        self.run(theta, drive, Noise::OFF)
-    }
-
-    fn equations(self: Arc<Self>) -> Option<Arc<dyn StateSpace>> {
-        Some(self)
-    }
-}
+use super::{Acting, Composed};
+use crate::record::{Drive, Signal};
+use crate::twin::{Interval, Noise, Now, Outline, SimulationError, Workspace};
 
 /// Checks that θ has the twin's length.
 pub(super) fn check_length(parameters: usize, theta: &[f64]) -> Result<(), SimulationError> {
@@ -46,7 +16,11 @@ pub(super) fn check_length(parameters: usize, theta: &[f64]) -> Result<(), Simul
 }
 
 /// Checks lengths once, before the loop relies on them.
-fn check_lengths(outline: &Outline, theta: &[f64], drive: &Drive) -> Result<(), SimulationError> {
+pub(super) fn check_lengths(
+    outline: &Outline,
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<(), SimulationError> {
     check_length(outline.parameters.len(), theta)?;
     let (given, inputs) = (drive.inputs().ncols(), outline.inputs.len());
     if given != inputs {
@@ -57,23 +31,73 @@ fn check_lengths(outline: &Outline, theta: &[f64], drive: &Drive) -> Result<(), 
     Ok(())
 }
 
+/// Equations in a run, without what acts before it and on its finished outputs.
+pub(super) trait Simulated {
+    fn start(&self, now: &Now<'_>, x: &mut [f64]);
+    fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]);
+    fn begin(&self, now: &Now<'_>, x: &mut [f64]);
+    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]);
+    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]);
+    fn readout(&self, now: &Now<'_>, y: &mut [f64]);
+    fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace);
+    fn constrain(&self, now: &Now<'_>, x: &mut [f64]);
+}
+
+impl Simulated for Composed {
+    fn start(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.start(now, x);
+    }
+    fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]) {
+        self.start_deviation(now, std);
+    }
+    fn begin(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.begin(now, x);
+    }
+    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        self.noise(now, process, measurement);
+    }
+    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        self.observe(now, x, y);
+    }
+    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
+        self.readout(now, y);
+    }
+    fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+        self.step(now, x, work);
+    }
+    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.constrain(now, x);
+    }
+}
+
+/// One run before its first sample.
+pub(crate) struct Setup<'s> {
+    pub outline: &'s Outline,
+    /// Boxes that are felt, by state.
+    pub limits: Vec<(usize, Interval)>,
+    pub acting: Acting<'s>,
+    pub dead_time: DeadTime,
+    pub work: Workspace,
+}
+
 /// The simulation loop. Allocates its buffers once; nothing inside the loop.
-pub(super) fn simulate_equations(
-    twin: &(impl StateSpace + ?Sized),
-    theta: &[f64],
-    drive: &Drive,
+pub(super) fn simulate(
+    twin: &impl Simulated,
+    setup: Setup<'_>,
     noise: Noise,
 ) -> Result<Signal, SimulationError> {
-    let outline = twin.outline();
-    check_lengths(&outline, theta, drive)?;
-    twin.check_parameters(theta, drive.dt())?;
-    let (n, p) = (outline.states.len(), outline.outputs.len());
-    let limits: Vec<(usize, Interval)> = twin
-        .limits()
-        .into_iter()
-        .enumerate()
-        .filter(|(_, limit)| *limit != Interval::EVERYTHING)
-        .collect();
+    let Setup {
+        outline,
+        limits,
+        acting,
+        mut dead_time,
+        mut work,
+    } = setup;
+    let (samples, n, p) = (
+        acting.samples(),
+        outline.states.len(),
+        outline.outputs.len(),
+    );
     let mut process: Vec<_> = (outline.states.iter())
         .map(|s| noise.source(&format!("process/{}", s.name)))
         .collect();
@@ -82,17 +106,14 @@ pub(super) fn simulate_equations(
         .collect();
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let mut x = vec![0.0; n];
-    let mut work = Workspace::new(twin);
-    let acting = Acting::of(twin, theta, drive)?;
-    let mut dead_time = DeadTime::of(twin, theta, drive.dt());
-    let mut outputs = vec![0.0; drive.samples() * p];
-    let first = acting.at(0, theta);
+    let mut outputs = vec![0.0; samples * p];
+    let first = acting.at(0);
     twin.start(&first, &mut x);
     if !noise.is_off() {
-        draw_start(twin, &first, &outline, noise, &mut x);
+        draw_start(twin, &first, (outline, &limits), noise, &mut x);
     }
-    for k in 0..drive.samples() {
-        let now = acting.at(k, theta);
+    for k in 0..samples {
+        let now = acting.at(k);
         let y = &mut outputs[k * p..(k + 1) * p];
         twin.observe(&now, &x, y);
         dead_time.hold_back(y);
@@ -110,7 +131,7 @@ pub(super) fn simulate_equations(
         if !y.iter().all(|v| v.is_finite()) {
             return Err(SimulationError::Diverged { at: now.t });
         }
-        twin.advance(&now, &mut x, &mut work);
+        twin.step(&now, &mut x, &mut work);
         if !noise.is_off() {
             for ((x, q), w) in x.iter_mut().zip(&q).zip(&mut process) {
                 if *q != 0.0 {
@@ -126,10 +147,8 @@ pub(super) fn simulate_equations(
             return Err(SimulationError::Diverged { at: now.t + now.dt });
         }
     }
-    let mut outputs = Signal::from_shape_vec((drive.samples(), p), outputs)
-        .map_err(|error| SimulationError::Fatal(error.into()))?;
-    twin.corrupt_outputs(theta, noise, &mut outputs);
-    Ok(outputs)
+    Signal::from_shape_vec((samples, p), outputs)
+        .map_err(|error| SimulationError::Fatal(error.into()))
 }
 
 /// Holds outputs back by their dead times; before the start, the first values stand.
@@ -141,7 +160,13 @@ pub(crate) struct DeadTime {
 }
 
 impl DeadTime {
-    pub fn of(twin: &(impl StateSpace + ?Sized), theta: &[f64], dt: f64) -> Self {
+    /// No output is late.
+    pub(super) const NONE: Self = Self {
+        late: vec![],
+        observed: vec![],
+    };
+
+    pub fn of(twin: &Composed, theta: &[f64], dt: f64) -> Self {
         Self {
             late: twin.dead_time(theta, dt),
             observed: vec![],
@@ -163,9 +188,9 @@ impl DeadTime {
 
 /// Moves the start by draws of its own deviations, within the limits.
 fn draw_start(
-    twin: &(impl StateSpace + ?Sized),
+    twin: &impl Simulated,
     now: &Now<'_>,
-    outline: &Outline,
+    (outline, limits): (&Outline, &[(usize, Interval)]),
     noise: Noise,
     x: &mut [f64],
 ) {
@@ -174,10 +199,12 @@ fn draw_start(
     if std.iter().all(|std| *std == 0.0) {
         return;
     }
-    let moved = (x.iter_mut().zip(&outline.states)).zip(std.iter().zip(twin.limits()));
-    for ((x, state), (std, limit)) in moved.filter(|(_, (std, _))| **std != 0.0) {
-        let mut source = noise.source(&format!("start/{}", state.name));
-        *x = limit.clamp(*x + std * source.normal());
+    let moved = (x.iter_mut().zip(&std)).zip(&outline.states);
+    for ((x, std), state) in moved.filter(|((_, std), _)| **std != 0.0) {
+        *x += std * noise.source(&format!("start/{}", state.name)).normal();
+    }
+    for &(i, limit) in limits.iter().filter(|(i, _)| std[*i] != 0.0) {
+        x[i] = limit.clamp(x[i]);
     }
     twin.begin(now, x);
 }

@@ -1,7 +1,7 @@
 //! Noise, divergence and lengths of a simulation.
 
 use super::*;
-use crate::twin::Parameter;
+use crate::twin::{DigitalTwin, Parameter, StateSpace};
 
 /// x ← a·x + w, observed with noise; two outputs.
 struct Walk;

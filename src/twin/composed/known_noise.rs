@@ -5,10 +5,10 @@ use crate::twin::Noise;
 
 /// Outputs as a mean, with independent normal noise on each of them.
 #[derive(Debug, Clone)]
-pub struct KnownNoise {
+pub(crate) struct KnownNoise {
     /// Outputs without noise, N × channels.
-    pub(crate) mean: Signal,
-    pub(crate) parts: Vec<NoisePart>,
+    pub mean: Signal,
+    pub parts: Vec<NoisePart>,
 }
 
 /// A part of an output's noise.

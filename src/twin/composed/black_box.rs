@@ -1,0 +1,282 @@
+//! Parts of a black box, over whole signals.
+
+use super::digital_twin::mean_run;
+use super::part::{Disturbance, Entry, LARGEST, ParameterChange, Placed, TwinPart};
+use super::parts::{Added, Parts, Theta};
+use super::simulation::check_length;
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::{
+    DigitalTwin, Integrator, KnownNoise, Noise, NoisePart, Now, Outline, ParameterSpace,
+    SimulationError, Stepping,
+};
+use std::sync::Arc;
+
+/// A simulator with all parts that are added to it, cheap to clone. Parts act on inputs and outputs, and on what is known of their noise.
+///
+/// A run cannot change its parameters on the way: where a parameter follows a function of inputs or time, outputs follow the runs at
+/// fixed values. That is right for changes that are slow beside the simulator's own memory.
+#[derive(Clone)]
+pub struct ComposedBlackBox {
+    own: Arc<dyn DigitalTwin>,
+    parts: Arc<Parts>,
+}
+
+debug_by_name!(ComposedBlackBox);
+
+/// Outputs of a run, its noise apart where this is known.
+enum Outputs {
+    Known(KnownNoise),
+    Drawn(Signal),
+}
+
+impl Outputs {
+    /// Signal behind which noise of the sensors enters.
+    fn signal(&mut self) -> &mut Signal {
+        match self {
+            Self::Known(known) => &mut known.mean,
+            Self::Drawn(signal) => signal,
+        }
+    }
+
+    fn drawn(self, noise: Noise) -> Signal {
+        match self {
+            Self::Known(known) => known.draw(noise),
+            Self::Drawn(signal) => signal,
+        }
+    }
+
+    fn add(&mut self, part: NoisePart, noise: Noise) {
+        match self {
+            Self::Known(known) => known.parts.push(part),
+            Self::Drawn(signal) => part.add(noise, signal),
+        }
+    }
+}
+
+impl From<Arc<dyn DigitalTwin>> for ComposedBlackBox {
+    fn from(own: Arc<dyn DigitalTwin>) -> Self {
+        let signals = own.signals();
+        let outline = Outline {
+            parameters: own.parameters(),
+            states: vec![],
+            inputs: signals.inputs,
+            outputs: signals.outputs,
+        };
+        let parts = Parts::none(
+            outline,
+            vec![],
+            (Integrator::default(), Stepping::default()),
+        );
+        let parts = Arc::new(parts);
+        Self { own, parts }
+    }
+}
+
+impl ComposedBlackBox {
+    /// Returns the same simulator with these parts.
+    pub(in crate::twin) fn of(&self, parts: Arc<Parts>) -> Self {
+        let own = self.own.clone();
+        Self { own, parts }
+    }
+
+    pub(in crate::twin) fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// Returns all of θ from the free entries, checked.
+    fn checked(&self, theta: &[f64], dt: f64) -> Result<Theta, SimulationError> {
+        check_length(self.parts.outline.parameters.len(), theta)?;
+        let theta = self.parts.complete(theta);
+        self.parts.check(&theta, dt)?;
+        Ok(theta)
+    }
+
+    /// Returns outputs where their noise is known, so that a likelihood needs no ensemble of runs: of a simulator without noise, whose
+    /// records have that of their sensors.
+    pub(crate) fn known_noise(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<KnownNoise>, SimulationError> {
+        let mut is_known = false;
+        for added in &self.parts.list {
+            match &added.part {
+                TwinPart::White(noise) => is_known = noise.is_silent,
+                TwinPart::Sensor(part) if part.is_of_readings => return Ok(None),
+                TwinPart::Rounding { .. } | TwinPart::Outliers { .. } => return Ok(None),
+                TwinPart::Disturbance(disturbance)
+                    if matches!(disturbance.entry, Entry::Actuator(_)) =>
+                {
+                    return Ok(None);
+                }
+                _ => {}
+            }
+        }
+        if !is_known {
+            return Ok(None);
+        }
+        let theta = self.checked(theta, drive.dt())?;
+        Ok(
+            match self.outputs(&self.parts.list, &theta, drive, Noise::OFF)? {
+                Outputs::Known(known) => Some(known),
+                Outputs::Drawn(_) => None,
+            },
+        )
+    }
+
+    /// Outputs behind these parts, θ all of it.
+    fn outputs(
+        &self,
+        parts: &[Added],
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Outputs, SimulationError> {
+        let Some((Added { part, .. }, inside)) = parts.split_last() else {
+            let own = &theta[..self.parts.parameters];
+            return Ok(Outputs::Drawn(self.own.simulate(own, drive, noise)?));
+        };
+        let inner = |theta: &[f64], drive: &Drive| self.outputs(inside, theta, drive, noise);
+        match part {
+            TwinPart::Actuator(part) => return inner(theta, &part.act(theta, drive)?),
+            TwinPart::Parameter { entry, change } => {
+                return self.followed(inside, (theta, *entry), change, (drive, noise));
+            }
+            TwinPart::Disturbance(part) => {
+                if let Entry::Actuator(input) = part.entry {
+                    let mut inputs = drive.inputs().clone();
+                    disturbance(part, input, theta).add(noise, &mut inputs);
+                    let drive = drive
+                        .with_inputs(inputs)
+                        .map_err(|_| SimulationError::Diverged { at: 0.0 })?;
+                    return inner(theta, &drive);
+                }
+            }
+            TwinPart::White(white) if white.is_silent => {
+                let run = || {
+                    let silent = self.outputs(inside, theta, drive, Noise::OFF)?;
+                    Ok(silent.drawn(Noise::OFF))
+                };
+                return Ok(Outputs::Known(KnownNoise {
+                    mean: white.run(theta, drive, run)?,
+                    parts: white.parts(theta).collect(),
+                }));
+            }
+            _ => {}
+        }
+        let mut outputs = inner(theta, drive)?;
+        match part {
+            TwinPart::Sensor(part) => {
+                if part.is_of_readings {
+                    outputs = Outputs::Drawn(outputs.drawn(noise));
+                }
+                part.pass(theta, drive, outputs.signal());
+            }
+            TwinPart::MeasurementNoise { target, level } => {
+                let source = format!("sensor-noise/{target}");
+                let level = (level.law)(level.m(theta));
+                outputs.add(NoisePart::white(*target, level, source), noise);
+            }
+            TwinPart::White(white) => white.parts(theta).for_each(|part| outputs.add(part, noise)),
+            TwinPart::Disturbance(part) => {
+                if let Entry::Sensor(output) = part.entry {
+                    outputs.add(disturbance(part, output, theta), noise);
+                }
+            }
+            TwinPart::Rounding { .. } | TwinPart::Outliers { .. } => {
+                let mut drawn = outputs.drawn(noise);
+                part.finish(theta, noise, &mut drawn);
+                outputs = Outputs::Drawn(drawn);
+            }
+            _ => {}
+        }
+        Ok(outputs)
+    }
+
+    /// Outputs where a parameter follows inputs or time: parabolas through three runs, in its logarithm.
+    ///
+    /// ```text
+    /// y(t) = Y(θ·exp(f(z(t))), t)        Y(θ, ·): a run with θ held;  z: an input or time
+    /// ```
+    fn followed(
+        &self,
+        inside: &[Added],
+        (theta, entry): (&[f64], usize),
+        change: &Placed<dyn ParameterChange>,
+        (drive, noise): (&Drive, Noise),
+    ) -> Result<Outputs, SimulationError> {
+        let m = change.m(theta);
+        let by: Vec<f64> = (0..drive.samples())
+            .map(|k| {
+                let now = Now::new(drive.time(k), drive.step(k), drive.input(k), theta);
+                change
+                    .law
+                    .value(m, &now, &[], 1.0)
+                    .ln()
+                    .clamp(-LARGEST, LARGEST)
+            })
+            .collect();
+        let low = by.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = by.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let at = |change: f64| {
+            let mut theta = Theta::from_slice(theta);
+            theta[entry] *= change.exp();
+            self.outputs(inside, &theta, drive, noise)
+        };
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let mut outputs = at(middle)?;
+        // What is far below rounding moves nothing.
+        if half <= f64::EPSILON {
+            return Ok(outputs);
+        }
+        let (mut first, mut last) = (at(low)?, at(high)?);
+        let (first, last) = (first.signal(), last.signal());
+        for ((k, v), mut row) in by.iter().enumerate().zip(outputs.signal().rows_mut()) {
+            let x = (v - middle) / half;
+            let ends = first.row(k).into_iter().zip(last.row(k));
+            for (y, (a, b)) in row.iter_mut().zip(ends) {
+                *y = 0.5 * x * (x - 1.0) * a + (1.0 - x * x) * *y + 0.5 * x * (x + 1.0) * b;
+            }
+        }
+        Ok(outputs)
+    }
+}
+
+/// The disturbance on a channel.
+fn disturbance(part: &Disturbance, channel: usize, theta: &[f64]) -> NoisePart {
+    let sigma = theta[part.sigma];
+    NoisePart {
+        output: channel,
+        level: Disturbance::share(part.memory) * sigma,
+        memory: Some(part.memory),
+        start: Disturbance::started(part.memory) * sigma,
+        source: "disturbance".to_owned(),
+    }
+}
+
+impl DigitalTwin for ComposedBlackBox {
+    fn parameters(&self) -> ParameterSpace {
+        self.parts.outline.parameters.clone()
+    }
+    fn signals(&self) -> Signals {
+        self.own.signals()
+    }
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        self.parts.call_hooks()?;
+        let theta = self.checked(theta, drive.dt())?;
+        Ok(self
+            .outputs(&self.parts.list, &theta, drive, noise)?
+            .drawn(noise))
+    }
+    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        if self.parts.list.is_empty() {
+            return (self.own).free_run(&self.checked(theta, drive.dt())?, drive);
+        }
+        mean_run(self, theta, drive)
+    }
+}

@@ -1,0 +1,260 @@
+//! A user's equations as the engine calls them: one call for all points of a step, compiled for each twin with its equations inline.
+
+use super::simulation::{DeadTime, Setup, Simulated, check_lengths, simulate};
+use super::{Acting, Composed};
+use crate::math::{LANES, Lanes};
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::integrator::felt;
+use crate::twin::points::{
+    LanePoints, Layout, Points, advance_one_by_one, lanes_one_by_one, noise_lanes, observe_lanes,
+    readout_lanes, readout_one_by_one,
+};
+use crate::twin::{
+    DigitalTwin, Integrator, Noise, Now, ParameterSpace, SimulationError, StateSpace, Workspace,
+};
+use std::sync::Arc;
+
+/// Calls of the engine that every user's equations have and none defines.
+///
+/// It is implemented for all of them at once, so that its loops are compiled with the equations inline: a filter that holds a
+/// `dyn Engine` pays one call for all its points.
+pub(crate) trait Engine: StateSpace {
+    /// Rates of points.
+    fn drift_points(&self, now: &Now<'_>, at: Layout, x: &[f64], dx: &mut [f64]);
+
+    /// Outputs of points, `p` each.
+    fn observe_points(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]);
+
+    /// Moves what changes at samples only.
+    fn update_points(&self, now: &Now<'_>, at: Layout, x: &mut [f64]);
+
+    /// Constrains points.
+    fn constrain_points(&self, now: &Now<'_>, at: Layout, x: &mut [f64]);
+
+    /// Puts outputs, `p` each, through the readout; returns whether it changed any.
+    fn readout_points(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool;
+
+    /// Carries the points of a filter over a step; returns whether a constraint acted on any that matters to the noise.
+    fn advance_points(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool;
+
+    /// As [`advance_points`](Self::advance_points) for several filters, one a lane.
+    fn advance_lanes(
+        &self,
+        now: &[Now<'_>],
+        points: LanePoints<'_>,
+        work: &mut Workspace,
+    ) -> [bool; LANES];
+
+    /// One output of the points, `n` states each, of several filters, one a lane; `buffer` holds those of one of them.
+    fn observe_lanes(
+        &self,
+        now: &[Now<'_>],
+        n: usize,
+        x: &[Lanes],
+        y: &mut [Lanes],
+        buffer: &mut [f64],
+    );
+
+    /// Noise levels of the states, four at most, and the output of several filters, one a lane.
+    fn noise_lanes(&self, now: &[Now<'_>], process: &mut [Lanes], measurement: &mut Lanes);
+
+    /// Values of one output of several filters, one a lane, through the readout; returns the lanes that it changed.
+    fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES];
+
+    /// One run of the equations alone.
+    fn run(&self, setup: Setup<'_>, noise: Noise) -> Result<Signal, SimulationError>;
+}
+
+impl<T: StateSpace> Engine for T {
+    fn drift_points(&self, now: &Now<'_>, at: Layout, x: &[f64], dx: &mut [f64]) {
+        for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
+            self.drift(now, x, dx);
+        }
+    }
+
+    fn observe_points(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
+        for (i, y) in y.chunks_exact_mut(p).enumerate() {
+            self.observe(now, &x[i * at.stride..][..at.states], y);
+        }
+    }
+
+    fn update_points(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
+        for x in at.each_mut(x) {
+            self.update(now, x);
+        }
+    }
+
+    fn constrain_points(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
+        for x in at.each_mut(x) {
+            self.constrain(now, x);
+        }
+    }
+
+    fn readout_points(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool {
+        match p {
+            1 => readout_one_by_one(1, y, |y| self.readout(now, y)),
+            p => readout_one_by_one(p, y, |y| self.readout(now, y)),
+        }
+    }
+
+    fn advance_points(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
+        // Loops of known length, for the sizes of most twins.
+        let advance = |x: &mut [f64]| step(self, now, x, work);
+        let constrain = |x: &mut [f64]| self.constrain(now, x);
+        match points.shifts.len() {
+            1 => advance_one_by_one(1, points, advance, constrain),
+            2 => advance_one_by_one(2, points, advance, constrain),
+            3 => advance_one_by_one(3, points, advance, constrain),
+            4 => advance_one_by_one(4, points, advance, constrain),
+            5 => advance_one_by_one(5, points, advance, constrain),
+            n => advance_one_by_one(n, points, advance, constrain),
+        }
+    }
+
+    fn advance_lanes(
+        &self,
+        now: &[Now<'_>],
+        points: LanePoints<'_>,
+        work: &mut Workspace,
+    ) -> [bool; LANES] {
+        let advance = |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
+        match points.shifts.len() {
+            1 => lanes_one_by_one(1, now, points, advance),
+            2 => lanes_one_by_one(2, now, points, advance),
+            3 => lanes_one_by_one(3, now, points, advance),
+            n => lanes_one_by_one(n, now, points, advance),
+        }
+    }
+
+    fn observe_lanes(
+        &self,
+        now: &[Now<'_>],
+        n: usize,
+        x: &[Lanes],
+        y: &mut [Lanes],
+        buffer: &mut [f64],
+    ) {
+        let observe = |now: &Now<'_>, x: &[f64], y: &mut [f64]| {
+            self.observe_points(now, Layout::dense(n), 1, x, y);
+        };
+        match n {
+            1 => observe_lanes(1, now, x, y, buffer, observe),
+            2 => observe_lanes(2, now, x, y, buffer, observe),
+            3 => observe_lanes(3, now, x, y, buffer, observe),
+            n => observe_lanes(n, now, x, y, buffer, observe),
+        }
+    }
+
+    fn noise_lanes(&self, now: &[Now<'_>], process: &mut [Lanes], measurement: &mut Lanes) {
+        let noise = |now: &Now<'_>, q: &mut [f64], r: &mut [f64]| self.noise(now, q, r);
+        match process.len() {
+            1 => noise_lanes(1, now, process, measurement, noise),
+            2 => noise_lanes(2, now, process, measurement, noise),
+            3 => noise_lanes(3, now, process, measurement, noise),
+            n => noise_lanes(n, now, process, measurement, noise),
+        }
+    }
+
+    fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES] {
+        readout_lanes(now, y, |now, y| self.readout_points(now, 1, y))
+    }
+
+    fn run(&self, setup: Setup<'_>, noise: Noise) -> Result<Signal, SimulationError> {
+        simulate(&Alone(self), setup, noise)
+    }
+}
+
+impl<T: StateSpace + 'static> DigitalTwin for T {
+    fn parameters(&self) -> ParameterSpace {
+        self.outline().parameters
+    }
+
+    fn signals(&self) -> Signals {
+        self.outline().signals()
+    }
+
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        run_alone(self, theta, drive, noise)
+    }
+
+    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        run_alone(self, theta, drive, Noise::OFF)
+    }
+
+    fn equations(self: Arc<Self>) -> Option<Composed> {
+        Some(Composed::new(self))
+    }
+}
+
+/// One run of equations that nothing is added to.
+fn run_alone<T: StateSpace>(
+    twin: &T,
+    theta: &[f64],
+    drive: &Drive,
+    noise: Noise,
+) -> Result<Signal, SimulationError> {
+    let outline = twin.outline();
+    check_lengths(&outline, theta, drive)?;
+    twin.check_parameters(theta, drive.dt())?;
+    let (limits, stepping) = (twin.limits(), twin.stepping());
+    let setup = Setup {
+        outline: &outline,
+        limits: felt(&limits),
+        acting: Acting::plain(theta, drive, stepping.hold),
+        dead_time: DeadTime::NONE,
+        work: Workspace::of(&outline, &limits, (twin.integrator(), stepping)),
+    };
+    simulate(&Alone(twin), setup, noise)
+}
+
+/// One step of one state without noise and limits: memories, then motion.
+#[inline(always)]
+fn step<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+    twin.update(now, x);
+    // One call of the drift, compiled inline, for what most twins do.
+    if work.is_plain() {
+        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| twin.drift(now, x, dx);
+        return Integrator::Euler.step(now, x, work, drift);
+    }
+    carry(twin, now, x, work);
+}
+
+/// One step by any integrator, in substeps.
+#[inline(never)]
+fn carry<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+    let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| twin.drift(now, x, dx);
+    work.carry(x.len(), now, x, drift);
+}
+
+/// A user's equations without any parts, in a run.
+struct Alone<'t, T>(&'t T);
+
+impl<T: StateSpace> Simulated for Alone<'_, T> {
+    fn start(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.0.start(now, x);
+    }
+    fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]) {
+        self.0.start_deviation(now, std);
+    }
+    fn begin(&self, _: &Now<'_>, _: &mut [f64]) {}
+    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        self.0.noise(now, process, measurement);
+    }
+    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        self.0.observe(now, x, y);
+    }
+    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
+        self.0.readout(now, y);
+    }
+    fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+        step(self.0, now, x, work);
+    }
+    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.0.constrain(now, x);
+    }
+}

@@ -1,0 +1,324 @@
+//! Equations with everything that is added to them: held parameters, settings, effects, disturbances, fitted noise.
+//!
+//! | phase | file |
+//! |---|---|
+//! | the laws of parts, and the parts | `part.rs` |
+//! | parts sorted by when they act; the inside of a delay | `parts.rs` |
+//! | motion: rates, memories, limits, points of a step | `motion.rs` |
+//! | outputs, starts and inputs | `signals.rs` |
+//! | noise levels | `noise.rs`, `levels.rs` |
+//! | inputs that act; the loop of a run | `acting.rs`, `simulation.rs` |
+//! | a user's equations, compiled for all points of a step | `engine.rs` |
+//! | the trait of all simulators; the same parts over whole signals of a black box | `digital_twin.rs`, `black_box.rs`, `sensor_noise.rs`, `known_noise.rs` |
+
+mod acting;
+mod black_box;
+mod digital_twin;
+mod engine;
+mod known_noise;
+mod levels;
+mod motion;
+mod noise;
+mod part;
+mod parts;
+mod sensor_noise;
+mod signals;
+mod simulation;
+
+pub(crate) use acting::Acting;
+pub use black_box::ComposedBlackBox;
+pub use digital_twin::DigitalTwin;
+pub(in crate::twin) use digital_twin::FREE_RUNS;
+pub(crate) use known_noise::{KnownNoise, NoisePart};
+pub(crate) use levels::{FittedLevels, LevelSource, Setting};
+pub(crate) use part::{
+    Disturbance, Entry, LARGEST, NoiseLaw, OutlierLaw, OutputChannel, ParameterChange, Placed,
+    RateChange, SignalChange, SignalPart, StateLimit, StatePair, TwinPart,
+};
+pub(crate) use sensor_noise::{SensorNoise, WhiteLevel};
+pub(crate) use simulation::DeadTime;
+
+use crate::record::{Drive, Signal};
+use crate::twin::integrator::felt;
+use crate::twin::{
+    Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace, Stepping,
+    Workspace,
+};
+use engine::Engine;
+pub(in crate::twin) use parts::Parts;
+pub(in crate::twin) use parts::Theta;
+use simulation::{Setup, check_lengths, simulate};
+use std::sync::Arc;
+
+/// Equations of a twin with all parts that are added to them, as filters and simulations see them; cheap to clone.
+///
+/// θ is that of the twin's free parameters, then that of the parts; x has the twin's states, then memories of parts. Parts are kept
+/// flat: from here to the user's equations it is one call for all points of a step.
+///
+/// ```
+/// use truetwin::twin::{Composed, Now};
+/// use truetwin::twins::VanDerPol;
+///
+/// let twin = Composed::from(VanDerPol);
+/// let mut rates = [0.0; 2];
+/// twin.drift(&Now::new(0.0, 0.05, &[], &[1.5]), &[1.0, 2.0], &mut rates);
+/// assert_eq!(rates, [2.0, -1.0]);
+/// ```
+#[derive(Clone)]
+pub struct Composed {
+    own: Arc<dyn Engine>,
+    parts: Arc<Parts>,
+}
+
+debug_by_name!(Composed);
+
+impl<T: StateSpace + 'static> From<T> for Composed {
+    fn from(own: T) -> Self {
+        Self::new(Arc::new(own))
+    }
+}
+
+impl From<&Composed> for Composed {
+    fn from(twin: &Composed) -> Self {
+        twin.clone()
+    }
+}
+
+impl Composed {
+    /// Returns a user's equations, without parts.
+    pub fn new<T: StateSpace + 'static>(own: Arc<T>) -> Self {
+        let rule = (own.integrator(), own.stepping());
+        let parts = Arc::new(Parts::none(own.outline(), own.limits(), rule));
+        Self { own, parts }
+    }
+
+    /// Returns names and units of all that is free, of states of parts, too.
+    pub fn outline(&self) -> Outline {
+        self.parts.outline.clone()
+    }
+
+    /// Returns the box of each state.
+    pub fn limits(&self) -> &[Interval] {
+        &self.parts.limits
+    }
+
+    /// Returns the integrator.
+    pub(crate) fn integrator(&self) -> Integrator {
+        self.parts.integrator
+    }
+
+    /// Returns substeps and hold.
+    pub(crate) fn stepping(&self) -> Stepping {
+        self.parts.stepping
+    }
+
+    /// Returns whether this is another handle of the same twin.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.own, &other.own) && Arc::ptr_eq(&self.parts, &other.parts)
+    }
+
+    /// Returns the number of states.
+    fn states(&self) -> usize {
+        self.parts.outline.states.len()
+    }
+
+    /// Returns the same equations with these parts.
+    pub(in crate::twin) fn of(&self, parts: Arc<Parts>) -> Self {
+        let own = self.own.clone();
+        Self { own, parts }
+    }
+
+    pub(in crate::twin) fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// Returns buffers for its motion.
+    pub(crate) fn workspace(&self) -> Workspace {
+        let rule = (self.integrator(), self.stepping());
+        Workspace::of(&self.parts.outline, self.limits(), rule)
+    }
+
+    /// Returns all of θ from the free entries.
+    pub(crate) fn complete(&self, theta: &[f64]) -> Theta {
+        self.parts.complete(theta)
+    }
+
+    /// Calls `then` with all of θ in place of the free entries.
+    #[inline(always)]
+    fn resolved<R>(&self, now: &Now<'_>, then: impl FnOnce(&Now<'_>) -> R) -> R {
+        if now.theta.len() == self.parts.entries() {
+            return then(now);
+        }
+        let theta = self.complete(now.theta);
+        then(&Now {
+            theta: &theta,
+            ..*now
+        })
+    }
+
+    /// Calls `then` with the twin's own time and θ, as parts bend them beside the states `x`; without states, what follows them bends
+    /// nothing. `now` has all of θ.
+    #[inline(always)]
+    fn inside<R>(&self, now: &Now<'_>, x: Option<&[f64]>, then: impl FnOnce(&Now<'_>) -> R) -> R {
+        let parts = &*self.parts;
+        let own = &now.theta[..parts.parameters];
+        let t = parts.time(now, 0);
+        if !parts.acts.on_parameters {
+            return then(&Now {
+                t,
+                theta: own,
+                ..*now
+            });
+        }
+        let mut theta = Theta::from_slice(own);
+        for added in parts.list.iter().rev() {
+            match (&added.part, x) {
+                (TwinPart::Parameter { entry, change }, x)
+                    if x.is_some() || !change.law.sees_states() =>
+                {
+                    let at = Now {
+                        t: parts.time(now, added.delays),
+                        ..*now
+                    };
+                    let (value, m) = (&mut theta[*entry], change.m(now.theta));
+                    *value = change.law.value(m, &at, x.unwrap_or(&[]), *value);
+                }
+                (TwinPart::Disturbance(part), Some(x)) => {
+                    if let Entry::Parameter(entry) = part.entry {
+                        theta[entry] *= x[added.states.start].clamp(-LARGEST, LARGEST).exp();
+                    }
+                }
+                _ => {}
+            }
+        }
+        then(&Now {
+            t,
+            theta: &theta,
+            ..*now
+        })
+    }
+
+    /// Checks once before a run that θ can be simulated at this step.
+    pub(crate) fn check_parameters(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
+        let theta = self.complete(theta);
+        (self.own).check_parameters(&theta[..self.parts.parameters], dt)?;
+        self.parts.check(&theta, dt)
+    }
+
+    /// Simulates the equations.
+    pub(crate) fn run(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        self.parts.call_hooks()?;
+        let outline = &self.parts.outline;
+        check_lengths(outline, theta, drive)?;
+        self.check_parameters(theta, drive.dt())?;
+        let mut setup = Setup {
+            outline,
+            limits: felt(self.limits()),
+            acting: Acting::of(self, theta, drive)?,
+            dead_time: DeadTime::of(self, theta, drive.dt()),
+            work: self.workspace(),
+        };
+        let mut outputs = if self.parts.acts.leave_runs() {
+            setup.acting.first_entries(self.parts.parameters);
+            self.own.run(setup, noise)?
+        } else {
+            simulate(self, setup, noise)?
+        };
+        self.finish(theta, noise, &mut outputs);
+        Ok(outputs)
+    }
+
+    /// Returns the steps to which finished outputs are rounded, by output, 0 for none; empty without any. A filter takes an output for all
+    /// signals that are rounded to it, whatever the offset of the steps.
+    pub(crate) fn rounding(&self, theta: &[f64]) -> Vec<f64> {
+        let (mut all, theta) = (vec![], self.complete(theta));
+        for added in &self.parts.list {
+            if let TwinPart::Rounding { target, step } = &added.part {
+                all.resize(self.outputs(), 0.0);
+                let own: f64 = (step.law)(step.m(&theta));
+                all[*target] = own.max(all[*target]);
+            }
+        }
+        all
+    }
+
+    /// Returns probability and size of outliers, by output; empty without any.
+    pub(crate) fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
+        let (mut all, theta) = (vec![], self.complete(theta));
+        for added in &self.parts.list {
+            if let TwinPart::Outliers { target, law, .. } = &added.part {
+                let own = (law.law)(law.m(&theta));
+                all.resize(self.outputs(), Outliers::default());
+                let both: &mut Outliers = &mut all[*target];
+                // Both are rare: their probabilities add up, and the larger ones are seen.
+                both.probability += own.probability;
+                both.scale = both.scale.max(own.scale);
+            }
+        }
+        all
+    }
+
+    /// Rounds finished outputs, and adds outliers, which are drawn over the whole record.
+    pub(crate) fn finish(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
+        let theta = self.complete(theta);
+        for added in &self.parts.list {
+            added.part.finish(&theta, noise, outputs);
+        }
+    }
+}
+
+impl Parts {
+    fn check(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
+        self.list.iter().try_for_each(|added| match &added.part {
+            TwinPart::Check(check) => check(theta, dt),
+            _ => Ok(()),
+        })
+    }
+
+    fn call_hooks(&self) -> Result<(), SimulationError> {
+        self.list
+            .iter()
+            .rev()
+            .try_for_each(|added| match &added.part {
+                TwinPart::Hook(hook) => hook(),
+                _ => Ok(()),
+            })
+    }
+}
+
+impl TwinPart {
+    /// Rounds the finished channel of a part to multiples of its step, halves upwards, or adds its outliers.
+    fn finish(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
+        match self {
+            Self::Rounding { target, step } => {
+                let step = (step.law)(step.m(theta));
+                if step > 0.0 {
+                    (outputs.column_mut(*target))
+                        .mapv_inplace(|value| step * (value / step + 0.5).floor());
+                }
+            }
+            Self::Outliers {
+                target,
+                law,
+                source,
+            } => {
+                let hits = (law.law)(law.m(theta));
+                let mut source = noise.source(source);
+                for value in outputs.column_mut(*target) {
+                    // Both draws always, so that other magnitudes see the same draws.
+                    let (hit, size) = (source.happens(hits.probability), source.normal());
+                    *value += if hit { hits.scale * size } else { 0.0 };
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

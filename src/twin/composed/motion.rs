@@ -1,0 +1,272 @@
+//! Motion of composed equations, of as many points as are given.
+
+use super::parts::Theta;
+use super::{Composed, Entry, TwinPart};
+use crate::math::{LANES, Lanes};
+use crate::twin::points::{
+    LanePoints, Layout, Points, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes,
+    shifted_value,
+};
+use crate::twin::{Now, Workspace};
+
+impl Composed {
+    /// Sets `dx` to the rates of the states `x`, of one point or of several side by side.
+    pub fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        self.resolved(now, |now| self.rates(now, x, dx));
+    }
+
+    /// Constrains points after a step, before their boxes.
+    pub fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.resolved(now, |now| self.bound(now, x));
+    }
+
+    /// Moves what changes at samples only: memories, before the motion starts.
+    pub(crate) fn update(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.resolved(now, |now| self.remember(now, x));
+    }
+
+    /// Points that are called together: all, or each where parameters follow states.
+    #[inline]
+    fn together(&self, numbers: usize) -> usize {
+        match self.parts.acts.by_states {
+            true => self.states(),
+            false => numbers,
+        }
+        .max(1)
+    }
+
+    #[inline]
+    fn layout(&self) -> Layout {
+        Layout {
+            states: self.parts.states,
+            stride: self.states(),
+        }
+    }
+
+    fn rates(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        let (at, together) = (self.layout(), self.together(x.len()));
+        for (x, dx) in x.chunks_exact(together).zip(dx.chunks_exact_mut(together)) {
+            if at.states < at.stride {
+                for dx in dx.chunks_exact_mut(at.stride) {
+                    dx[at.states..].fill(0.0);
+                }
+            }
+            self.inside(now, Some(x), |own| {
+                self.own.drift_points(own, at, x, dx);
+                if self.parts.acts.on_rates {
+                    self.push(now, own, x, dx);
+                }
+            });
+        }
+    }
+
+    /// Adds forces and disturbances; `own` has the twin's own θ.
+    fn push(&self, now: &Now<'_>, own: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        let at = self.layout();
+        for added in &self.parts.list {
+            match &added.part {
+                TwinPart::Rate { on, change } => {
+                    let seen = Now {
+                        t: self.parts.time(now, added.delays),
+                        ..*own
+                    };
+                    (change.law).push(change.m(now.theta), &seen, *on, at, x, dx);
+                }
+                TwinPart::Late(_) => {
+                    if let Some(share) = self.parts.moving(now, added.delays) {
+                        dx.iter_mut().for_each(|dx| *dx *= share);
+                    }
+                }
+                TwinPart::Disturbance(part) => {
+                    if let Entry::State(i) = part.entry {
+                        let points = x.chunks_exact(at.stride);
+                        for (x, dx) in points.zip(dx.chunks_exact_mut(at.stride)) {
+                            dx[i] += x[added.states.start];
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn bound(&self, now: &Now<'_>, x: &mut [f64]) {
+        let at = self.layout();
+        if self.parts.acts.on_limits {
+            for added in self.parts.list.iter().rev() {
+                if let TwinPart::Limit { on, limit } = &added.part {
+                    limit.law.hold(limit.m(now.theta), *on, at, x);
+                }
+            }
+        }
+        self.each_inside(now, x, |own, x| self.own.constrain_points(own, at, x));
+    }
+
+    fn remember(&self, now: &Now<'_>, x: &mut [f64]) {
+        let at = self.layout();
+        if self.parts.acts.in_sensors {
+            self.remember_signals(now, x);
+        }
+        if self.parts.moves(now, 0) {
+            self.each_inside(now, x, |own, x| self.own.update_points(own, at, x));
+        }
+        if !self.parts.acts.in_disturbances {
+            return;
+        }
+        // Limits and motion of this step see the new value, as a held input does.
+        for (added, part, state) in self.parts.disturbances() {
+            if self.parts.moves(now, added.delays) {
+                for x in x.chunks_exact_mut(at.stride) {
+                    x[state] *= part.memory;
+                }
+            }
+        }
+    }
+
+    /// Changes points, θ being as it is beside the states before.
+    #[inline]
+    fn each_inside(&self, now: &Now<'_>, x: &mut [f64], change: impl Fn(&Now<'_>, &mut [f64])) {
+        if !self.parts.acts.by_states {
+            return self.inside(now, None, |own| change(own, x));
+        }
+        for x in x.chunks_exact_mut(self.states().max(1)) {
+            let seen = Theta::from_slice(x);
+            self.inside(now, Some(&seen), |own| change(own, x));
+        }
+    }
+
+    /// Carries one state over a step, without noise and limits: memories, then motion.
+    pub(crate) fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+        self.resolved(now, |now| {
+            self.remember(now, x);
+            let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.rates(now, x, dx);
+            work.carry(self.states(), now, x, drift);
+        });
+    }
+
+    /// Carries the points of a filter over a step; returns whether a constraint acted on any that matters to the noise.
+    pub(crate) fn advance(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
+        self.resolved(now, |now| {
+            if self.parts.acts.leave_motion() {
+                let own = Now {
+                    theta: &now.theta[..self.parts.parameters],
+                    ..*now
+                };
+                return self.own.advance_points(&own, points, work);
+            }
+            // Loops of known length, for the sizes of most twins.
+            match points.shifts.len() {
+                2 => self.advance_together(2, now, points, work),
+                3 => self.advance_together(3, now, points, work),
+                4 => self.advance_together(4, now, points, work),
+                n => self.advance_together(n, now, points, work),
+            }
+        })
+    }
+
+    /// Carries all points as one long state, so that each equation is called once.
+    #[inline(always)]
+    fn advance_together(
+        &self,
+        n: usize,
+        now: &Now<'_>,
+        mut points: Points<'_>,
+        work: &mut Workspace,
+    ) -> bool {
+        let shifts = &points.shifts[..n];
+        points.limit(n);
+        let (moving, shifted) = points.all.split_at_mut(points.moving * n);
+        self.remember(now, moving);
+        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.rates(now, x, dx);
+        work.carry(n, now, moving, drift);
+        let pairs = || (shifts.iter().enumerate()).flat_map(|(i, s)| [(i, *s), (i, -s)]);
+        let before = work.stage(n);
+        before.copy_from_slice(&moving[..n]);
+        for (x, of) in shifted.chunks_exact_mut(n).zip(pairs()) {
+            for (j, x) in x.iter_mut().enumerate() {
+                *x = shifted_value(before, of, j);
+            }
+        }
+        self.bound(now, points.all);
+        let (moving, shifted) = points.all.split_at(points.moving * n);
+        let mut bent = false;
+        for (x, before) in moving[..n].iter().zip(&*before) {
+            bent |= x.to_bits() != before.to_bits();
+        }
+        for (x, of) in shifted.chunks_exact(n).zip(pairs()) {
+            for (j, x) in x.iter().enumerate() {
+                bent |= x.to_bits() != shifted_value(before, of, j).to_bits();
+            }
+        }
+        bent
+    }
+
+    /// As [`advance`](Self::advance), of several filters, one a lane.
+    pub(crate) fn advance_lanes(
+        &self,
+        now: &[Now<'_>],
+        points: LanePoints<'_>,
+        work: &mut Workspace,
+    ) -> [bool; LANES] {
+        if self.parts.acts.leave_motion() {
+            return self.lanes_alone(now, |now| self.own.advance_lanes(now, points, work));
+        }
+        let advance = |now: &Now<'_>, points: Points<'_>| self.advance(now, points, work);
+        lanes_one_by_one(points.shifts.len(), now, points, advance)
+    }
+
+    /// One output of the points, `n` states each, of several filters, one a lane; `buffer` holds those of one of them.
+    pub(crate) fn observe_lanes(
+        &self,
+        now: &[Now<'_>],
+        n: usize,
+        x: &[Lanes],
+        y: &mut [Lanes],
+        buffer: &mut [f64],
+    ) {
+        if self.parts.acts.leave_motion() && !self.parts.acts.on_outputs {
+            return self.lanes_alone(now, |now| self.own.observe_lanes(now, n, x, y, buffer));
+        }
+        let observe = |now: &Now<'_>, x: &[f64], y: &mut [f64]| self.observe(now, x, y);
+        observe_lanes(n, now, x, y, buffer, observe);
+    }
+
+    /// Noise levels of the states, four at most, and the output of several filters, one a lane.
+    pub(crate) fn noise_lanes(
+        &self,
+        now: &[Now<'_>],
+        process: &mut [Lanes],
+        measurement: &mut Lanes,
+    ) {
+        if self.parts.acts.leave_motion() && !self.parts.acts.on_noise {
+            return self.lanes_alone(now, |now| self.own.noise_lanes(now, process, measurement));
+        }
+        let noise = |now: &Now<'_>, q: &mut [f64], r: &mut [f64]| self.noise(now, q, r);
+        noise_lanes(process.len(), now, process, measurement, noise);
+    }
+
+    /// Puts values of one output of several filters, one a lane, through the readout; returns the lanes that it changed.
+    pub(crate) fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES] {
+        if self.parts.leave_readings() {
+            return self.lanes_alone(now, |now| self.own.readout_lanes(now, y));
+        }
+        readout_lanes(now, y, |now, y| self.readout(now, y))
+    }
+
+    /// Calls `then` with the twin's own θ in each lane; `now` has all of it.
+    #[inline]
+    fn lanes_alone<R>(&self, now: &[Now<'_>], then: impl FnOnce(&[Now<'_>]) -> R) -> R {
+        let own = self.parts.parameters;
+        if self.parts.entries() == own {
+            return then(now);
+        }
+        let nows: [Now<'_>; LANES] = std::array::from_fn(|lane| {
+            let at = &now[if lane < now.len() { lane } else { 0 }];
+            Now {
+                theta: &at.theta[..own],
+                ..*at
+            }
+        });
+        then(&nows[..now.len()])
+    }
+}

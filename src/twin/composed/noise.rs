@@ -1,0 +1,65 @@
+//! Noise levels of composed equations.
+
+use super::{Composed, Disturbance, TwinPart};
+use crate::twin::Now;
+
+impl Composed {
+    /// Sets the standard deviations of the increment of each state in a step, and of each output; both come zeroed.
+    pub fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        let parts = &self.parts;
+        self.resolved(now, |now| {
+            let dt = parts.noise_step.unwrap_or(now.dt);
+            self.inside(&Now { dt, ..*now }, None, |own| {
+                (self.own).noise(own, &mut process[..parts.states], measurement);
+            });
+            if !parts.acts.on_noise {
+                return;
+            }
+            for added in &parts.list {
+                let dt = added.step.unwrap_or(now.dt);
+                let now = &Now { dt, ..*now };
+                match &added.part {
+                    TwinPart::ProcessNoise { target, level } => {
+                        join(&mut process[*target], (level.law)(level.m(now.theta)));
+                    }
+                    TwinPart::MeasurementNoise { target, level } => {
+                        join(&mut measurement[*target], (level.law)(level.m(now.theta)));
+                    }
+                    TwinPart::Level {
+                        is_process,
+                        target,
+                        level,
+                        step,
+                    } => {
+                        let value = level.value(now.theta);
+                        match is_process {
+                            // Variances add up over time: another step is not another physics.
+                            true => process[*target] = value * (dt / step).sqrt(),
+                            false => measurement[*target] = value,
+                        }
+                    }
+                    TwinPart::Levels(levels) => levels.set(now, process, measurement),
+                    TwinPart::Late(_) => {
+                        if let Some(share) = parts.moving(now, added.delays) {
+                            process.iter_mut().for_each(|q| *q *= share.sqrt());
+                        }
+                    }
+                    TwinPart::Disturbance(part) => {
+                        let share = Disturbance::share(part.memory);
+                        process[added.states.start] = share * now.theta[part.sigma];
+                    }
+                    TwinPart::Unit(factor) => measurement.iter_mut().for_each(|r| *r *= factor),
+                    _ => {}
+                }
+            }
+        });
+    }
+}
+
+/// Joins a standard deviation to a level.
+fn join(level: &mut f64, added: f64) {
+    // hypot is not exact for a zero side; off must be.
+    if added != 0.0 {
+        *level = level.hypot(added);
+    }
+}

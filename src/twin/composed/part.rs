@@ -1,0 +1,261 @@
+//! Parts that twins are composed of, and the laws of those parts.
+
+use super::levels::{FittedLevels, Setting};
+use super::sensor_noise::SensorNoise;
+use crate::twin::points::Layout;
+use crate::twin::{Integrator, Interval, Now, Outliers, SimulationError, Stepping};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A standard deviation or a step, from magnitudes.
+pub(crate) type NoiseLaw = dyn Fn(&[f64]) -> f64 + Send + Sync;
+/// Frequency and size of rare large errors, from magnitudes.
+pub(crate) type OutlierLaw = dyn Fn(&[f64]) -> Outliers + Send + Sync;
+/// A check of all of θ at a step Δt.
+pub(crate) type ParameterCheck = dyn Fn(&[f64], f64) -> Result<(), SimulationError> + Send + Sync;
+/// A call before each run of a twin; its error stops the run.
+pub(crate) type Hook = dyn Fn() -> Result<(), SimulationError> + Send + Sync;
+
+/// A channel of the outputs of several points, and the memory of its law in their states.
+#[derive(Debug, Clone)]
+pub(crate) struct OutputChannel {
+    /// Memory values in the state.
+    pub memory: Range<usize>,
+    /// Index of the channel.
+    pub target: usize,
+}
+
+/// Target and other state of a law on states.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StatePair {
+    /// Index of the target.
+    pub target: usize,
+    /// Index of the other state.
+    pub other: Option<usize>,
+}
+
+/// Change of a signal, over several points at once; `m` are its magnitudes.
+pub(crate) trait SignalChange: Send + Sync {
+    /// Passes the channel of points, `p` outputs each, through the law; advances its memory in the states.
+    fn pass(
+        &self,
+        m: &[f64],
+        now: &Now<'_>,
+        on: &OutputChannel,
+        (at, x): (Layout, &mut [f64]),
+        outputs: (usize, &mut [f64]),
+    ) {
+        self.peek(m, now, on, (at, x), outputs);
+    }
+
+    /// As [`pass`](Self::pass), the memories left as they are.
+    fn peek(
+        &self,
+        m: &[f64],
+        now: &Now<'_>,
+        on: &OutputChannel,
+        states: (Layout, &[f64]),
+        outputs: (usize, &mut [f64]),
+    );
+}
+
+impl dyn SignalChange {
+    /// Returns one value behind a law without memory.
+    pub(crate) fn value(&self, m: &[f64], now: &Now<'_>, s: f64) -> f64 {
+        let on = OutputChannel {
+            memory: 0..0,
+            target: 0,
+        };
+        let mut y = [s];
+        self.peek(m, now, &on, (Layout::dense(1), &[0.0]), (1, &mut y));
+        y[0]
+    }
+}
+
+/// Addition to the rate of a state, over several points at once.
+pub(crate) trait RateChange: Send + Sync {
+    /// Adds to the rates of points; `now` holds the twin's own θ.
+    fn push(&self, m: &[f64], now: &Now<'_>, on: StatePair, at: Layout, x: &[f64], dx: &mut [f64]);
+}
+
+/// Limit of a state after each step, over several points at once.
+pub(crate) trait StateLimit: Send + Sync {
+    /// Bends the target and the other state of points.
+    fn hold(&self, m: &[f64], on: StatePair, at: Layout, x: &mut [f64]);
+}
+
+/// Change of a parameter while the twin runs.
+pub(crate) trait ParameterChange: Send + Sync {
+    /// Returns the value of the parameter at a time, beside the states `x` if it sees these.
+    fn value(&self, m: &[f64], now: &Now<'_>, x: &[f64], value: f64) -> f64;
+
+    /// Returns whether the value depends on the states.
+    fn sees_states(&self) -> bool {
+        false
+    }
+}
+
+/// A law, and where its magnitudes stand in θ.
+#[derive(Debug)]
+pub(crate) struct Placed<L: ?Sized> {
+    pub law: Arc<L>,
+    /// Entries of θ, held ones counted.
+    pub magnitudes: Range<usize>,
+}
+
+impl<L: ?Sized> Clone for Placed<L> {
+    fn clone(&self) -> Self {
+        Self {
+            law: self.law.clone(),
+            magnitudes: self.magnitudes.clone(),
+        }
+    }
+}
+
+impl<L: ?Sized> Placed<L> {
+    /// Returns the magnitudes.
+    #[inline]
+    pub fn m<'t>(&self, theta: &'t [f64]) -> &'t [f64] {
+        &theta[self.magnitudes.clone()]
+    }
+}
+
+/// A change of one signal.
+#[derive(Clone)]
+pub(crate) struct SignalPart {
+    /// Name, from which its memory in the state has those of its values.
+    pub name: String,
+    /// Index of the channel.
+    pub target: usize,
+    /// Number of values that it remembers; they begin at the first value of the signal.
+    pub memory: usize,
+    /// `true` where it stands behind the noise of measurement; it then remembers nothing.
+    pub is_of_readings: bool,
+    /// `true` where it shows the signal as it was so many seconds ago, its first magnitude.
+    pub is_dead_time: bool,
+    pub change: Placed<dyn SignalChange>,
+}
+
+/// Point at which a disturbance or a function enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Entry {
+    /// Added to the rate of a state.
+    State(usize),
+    /// Added to an output, before its noise.
+    Sensor(usize),
+    /// Added to an input; only where there are no equations.
+    Actuator(usize),
+    /// Added to the logarithm of a parameter.
+    Parameter(usize),
+}
+
+/// Largest change of the logarithm of a parameter: e⁵ is beyond any that a record could show.
+pub(crate) const LARGEST: f64 = 5.0;
+
+/// An Ornstein–Uhlenbeck disturbance.
+///
+/// ```text
+/// d ← a·d + σ·√(1 − a²)·w        (a = 1: d ← d + σ·w)        ẋ_i + d,   y_j + d,   u_j + d   or   θ_i·exp(d)
+/// d ~ N(0, σ²) at the start      (a = 1: 0)
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Disturbance {
+    pub entry: Entry,
+    /// Share a of itself that it keeps from a step to the next.
+    pub memory: f64,
+    /// Entry of σ in θ.
+    pub sigma: usize,
+}
+
+impl Disturbance {
+    /// Standard deviation at the first sample, in units of σ: it began long before, unless it forgets nothing.
+    pub fn started(memory: f64) -> f64 {
+        if memory < 1.0 { 1.0 } else { 0.0 }
+    }
+
+    /// √(1 − a²), and 1 for a = 1: share of σ that comes anew at each step.
+    pub fn share(memory: f64) -> f64 {
+        match 1.0 - memory * memory {
+            s if s > 0.0 => s.sqrt(),
+            _ => 1.0,
+        }
+    }
+}
+
+/// A part of a composed twin. Entries of θ count held parameters, too.
+#[derive(Clone)]
+pub(crate) enum TwinPart {
+    /// Change of a parameter over time, or with the states.
+    Parameter {
+        entry: usize,
+        change: Placed<dyn ParameterChange>,
+    },
+    /// Force on a state.
+    Rate {
+        on: StatePair,
+        change: Placed<dyn RateChange>,
+    },
+    /// Limit of a state that is no box.
+    Limit {
+        on: StatePair,
+        limit: Placed<dyn StateLimit>,
+    },
+    /// Box of a state.
+    Box { state: usize, limit: Interval },
+    /// Change of an output.
+    Sensor(SignalPart),
+    /// Change of an input.
+    Actuator(SignalPart),
+    /// Delay of the whole twin, by the sum of these entries of θ in seconds.
+    Late(Vec<usize>),
+    /// Noise of a state, joined to its own.
+    ProcessNoise {
+        target: usize,
+        level: Placed<NoiseLaw>,
+    },
+    /// Noise of an output, joined to its own.
+    MeasurementNoise {
+        target: usize,
+        level: Placed<NoiseLaw>,
+    },
+    /// Noise level of a state or an output in place of the twin's own; a state's is that of the increment in `step`.
+    Level {
+        is_process: bool,
+        target: usize,
+        level: Setting,
+        step: f64,
+    },
+    /// Noise levels that a record fits.
+    Levels(FittedLevels),
+    /// Noise of the sensors of a black box.
+    White(SensorNoise),
+    /// Start of a state, and its standard deviation.
+    Start {
+        state: usize,
+        mean: Setting,
+        std: f64,
+    },
+    /// Standard deviation of a start for which none is declared.
+    UncertainStart { state: usize, std: f64 },
+    /// Rounding of a finished output, halves upwards.
+    Rounding {
+        target: usize,
+        step: Placed<NoiseLaw>,
+    },
+    /// Rare large errors of a finished output, drawn by this name.
+    Outliers {
+        target: usize,
+        law: Placed<OutlierLaw>,
+        source: String,
+    },
+    /// A disturbance, for which equations have a state more.
+    Disturbance(Disturbance),
+    /// Integrator and stepping in place of the twin's own.
+    Steps(Integrator, Stepping),
+    /// Outputs in another unit, larger by a factor.
+    Unit(f64),
+    /// Check before a run.
+    Check(Arc<ParameterCheck>),
+    /// Call before a run.
+    Hook(Arc<Hook>),
+}

@@ -1,0 +1,303 @@
+//! The list of parts of a twin, and the inside of its delays.
+
+use super::part::{Disturbance, Entry, TwinPart};
+use crate::record::Quantity;
+use crate::twin::{
+    Integrator, Interval, Now, Outline, Parameter, ParameterSpace, Stepping, TwinError,
+};
+use smallvec::SmallVec;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Values that a dead time keeps as states: it reads between two of them, and is moved by less than a sample where a filter differentiates.
+const BETWEEN_SAMPLES: usize = 3;
+
+/// θ of a twin, without the heap where it is short.
+pub(in crate::twin) type Theta = SmallVec<[f64; 16]>;
+
+/// A part in its place.
+#[derive(Clone)]
+pub(in crate::twin) struct Added {
+    pub part: TwinPart,
+    /// Number of delays of the twin inside of it: it sees those of this index on.
+    pub delays: usize,
+    /// Its memory in the state.
+    pub states: Range<usize>,
+    /// Step at which noise levels are asked, where it is not the present one.
+    pub step: Option<f64>,
+}
+
+/// Parts of a twin, sorted by place.
+#[derive(Clone)]
+pub(in crate::twin) struct Parts {
+    /// Parameters that are free; states of the twin, then of parts.
+    pub outline: Outline,
+    /// All parameters: the twin's, then those of parts. Free ones are `None`.
+    held: Vec<Option<f64>>,
+    /// Number of the twin's own states.
+    pub states: usize,
+    /// Number of the twin's own parameters.
+    pub parameters: usize,
+    pub limits: Vec<Interval>,
+    pub integrator: Integrator,
+    pub stepping: Stepping,
+    /// From the inside out. Of parts that are added together, those that act from the outside in (on parameters, limits, inputs) stand in
+    /// the opposite order.
+    pub list: Vec<Added>,
+    /// Entries of θ that add up to each delay, in seconds.
+    delays: Vec<Vec<usize>>,
+    /// Step at which the twin's own noise is asked.
+    pub noise_step: Option<f64>,
+    pub acts: Acts,
+}
+
+/// Phases of a step in which parts act: the others are the twin's own.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::twin) struct Acts {
+    pub on_parameters: bool,
+    /// `true` where a parameter follows states.
+    pub by_states: bool,
+    pub on_rates: bool,
+    pub on_limits: bool,
+    pub on_outputs: bool,
+    pub on_readings: bool,
+    pub on_noise: bool,
+    pub on_start: bool,
+    /// `true` where sensors remember.
+    pub in_sensors: bool,
+    /// `true` where disturbances move.
+    pub in_disturbances: bool,
+}
+
+impl Acts {
+    fn add(&mut self, part: &TwinPart) {
+        match part {
+            TwinPart::Parameter { change, .. } => {
+                self.on_parameters = true;
+                self.by_states |= change.law.sees_states();
+            }
+            TwinPart::Rate { .. } => self.on_rates = true,
+            TwinPart::Late(_) => (self.on_rates, self.on_noise) = (true, true),
+            TwinPart::Limit { .. } => self.on_limits = true,
+            TwinPart::Sensor(part) if part.is_of_readings => self.on_readings = true,
+            TwinPart::Sensor(part) => {
+                self.on_outputs = true;
+                self.in_sensors |= part.memory > 0;
+            }
+            TwinPart::Unit(_) => {
+                (self.on_outputs, self.on_noise, self.on_readings) = (true, true, true);
+            }
+            TwinPart::ProcessNoise { .. }
+            | TwinPart::MeasurementNoise { .. }
+            | TwinPart::Level { .. }
+            | TwinPart::Levels(_) => self.on_noise = true,
+            TwinPart::Start { .. } | TwinPart::UncertainStart { .. } => self.on_start = true,
+            TwinPart::Disturbance(part) => {
+                (self.in_disturbances, self.on_noise, self.on_start) = (true, true, true);
+                match part.entry {
+                    Entry::State(_) => self.on_rates = true,
+                    Entry::Sensor(_) => self.on_outputs = true,
+                    Entry::Parameter(_) => (self.on_parameters, self.by_states) = (true, true),
+                    Entry::Actuator(_) => {}
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Returns whether the equations move as the twin's own do.
+    pub fn leave_motion(self) -> bool {
+        let remembers = self.in_sensors || self.in_disturbances;
+        !(self.on_parameters || self.on_rates || self.on_limits || remembers)
+    }
+
+    /// Returns whether a run is one of the twin's own equations.
+    pub fn leave_runs(self) -> bool {
+        let changed = self.on_outputs || self.on_readings || self.on_noise || self.on_start;
+        self.leave_motion() && !changed
+    }
+}
+
+impl Parts {
+    /// Returns no parts of a twin.
+    pub fn none(outline: Outline, limits: Vec<Interval>, rule: (Integrator, Stepping)) -> Self {
+        Self {
+            held: vec![None; outline.parameters.len()],
+            states: outline.states.len(),
+            parameters: outline.parameters.len(),
+            outline,
+            limits,
+            integrator: rule.0,
+            stepping: rule.1,
+            list: vec![],
+            delays: vec![],
+            noise_step: None,
+            acts: Acts::default(),
+        }
+    }
+
+    /// Number of all parameters, held ones counted.
+    pub fn entries(&self) -> usize {
+        self.held.len()
+    }
+
+    /// Returns the entry of the free parameter of this index.
+    pub fn entry(&self, free: usize) -> usize {
+        let open = |entry: &usize| self.held[*entry].is_none();
+        (0..self.held.len())
+            .filter(open)
+            .nth(free)
+            .unwrap_or(usize::MAX)
+    }
+
+    /// Returns all of θ from the free entries; all of it is left as it is.
+    pub fn complete(&self, theta: &[f64]) -> Theta {
+        if theta.len() == self.held.len() {
+            return Theta::from_slice(theta);
+        }
+        let mut free = theta.iter();
+        (self.held.iter())
+            .map(|held| held.unwrap_or_else(|| free.next().copied().unwrap_or(f64::NAN)))
+            .collect()
+    }
+
+    /// Returns the parts with priors and bounds as `change` leaves them.
+    pub fn with_space(
+        &self,
+        change: impl FnOnce(&mut ParameterSpace) -> Result<(), TwinError>,
+    ) -> Result<Arc<Self>, TwinError> {
+        let mut all = self.clone();
+        change(&mut all.outline.parameters)?;
+        Ok(Arc::new(all))
+    }
+
+    /// Returns the parts with these parameters held; `free` are the others.
+    pub fn holding(&self, values: &BTreeMap<String, f64>, free: ParameterSpace) -> Arc<Self> {
+        let mut all = self.clone();
+        let open = all.held.iter_mut().filter(|held| held.is_none());
+        for (held, parameter) in open.zip(self.outline.parameters.iter()) {
+            *held = values.get(&parameter.name).copied();
+        }
+        all.outline.parameters = free;
+        Arc::new(all)
+    }
+
+    /// Returns the parts with parameters and parts more, which act together: along a signal in this order, behind those that are there; a
+    /// delay of the twin holds for all of them.
+    pub fn with(
+        &self,
+        parameters: impl IntoIterator<Item = Parameter>,
+        parts: Vec<TwinPart>,
+    ) -> Arc<Self> {
+        let mut all = self.clone();
+        for parameter in parameters {
+            all.outline.parameters.push(parameter);
+            all.held.push(None);
+        }
+        let (mut late, mut inputs, mut inside, mut outside) = (vec![], vec![], vec![], vec![]);
+        for part in parts {
+            match part {
+                TwinPart::Late(_) => late.push(part),
+                TwinPart::Actuator(_) => inputs.insert(0, part),
+                TwinPart::Parameter { .. } | TwinPart::Limit { .. } => inside.insert(0, part),
+                TwinPart::Rate { .. } => inside.push(part),
+                part => outside.push(part),
+            }
+        }
+        for part in [inside, late, outside, inputs].into_iter().flatten() {
+            all.add(part);
+        }
+        Arc::new(all)
+    }
+
+    fn add(&mut self, part: TwinPart) {
+        let (from, delays) = (self.outline.states.len(), self.delays.len());
+        match &part {
+            TwinPart::Box { state, limit } => self.limits[*state] = *limit,
+            TwinPart::Steps(integrator, stepping) => {
+                (self.integrator, self.stepping) = (*integrator, *stepping);
+            }
+            TwinPart::Late(entries) => self.delays.push(entries.clone()),
+            TwinPart::Sensor(part) if !part.is_of_readings => {
+                let memory = match part.is_dead_time {
+                    true => BETWEEN_SAMPLES,
+                    false => part.memory,
+                };
+                (0..memory).for_each(|k| self.add_state(&format!("{}/{k}", part.name)));
+            }
+            // Noise may be coloured where something else is disturbed.
+            TwinPart::Disturbance(_) => self.add_state(&format!("disturbance/{from}")),
+            TwinPart::Levels(levels) => {
+                // What is inside is asked at the step of declared levels.
+                let inside = self.list.iter_mut().map(|inside| &mut inside.step);
+                for step in inside.chain([&mut self.noise_step]) {
+                    step.get_or_insert(levels.step);
+                }
+            }
+            TwinPart::Unit(factor) => {
+                for output in &mut self.outline.outputs {
+                    output.unit = format!("{}/{factor}", output.unit);
+                }
+            }
+            _ => {}
+        }
+        self.acts.add(&part);
+        self.list.push(Added {
+            part,
+            delays,
+            states: from..self.outline.states.len(),
+            step: None,
+        });
+    }
+
+    fn add_state(&mut self, name: &str) {
+        self.outline.states.push(Quantity::new(name, ""));
+        self.limits.push(Interval::EVERYTHING);
+    }
+
+    /// Returns whether outputs are read as the twin's own are.
+    pub fn leave_readings(&self) -> bool {
+        !(self.acts.on_readings || self.acts.on_parameters) && self.delays.is_empty()
+    }
+
+    /// Returns the disturbances of equations, each with the index of its state.
+    pub fn disturbances(&self) -> impl Iterator<Item = (&Added, &Disturbance, usize)> {
+        self.list.iter().filter_map(|added| match &added.part {
+            TwinPart::Disturbance(part) => Some((added, part, added.states.start)),
+            _ => None,
+        })
+    }
+
+    /// Returns the delay of this index in seconds.
+    pub fn delay(&self, delay: usize, theta: &[f64]) -> f64 {
+        self.delays[delay].iter().map(|&j| theta[j]).sum()
+    }
+
+    /// Returns the time that is seen behind the delays from this index on.
+    #[inline]
+    pub fn time(&self, now: &Now<'_>, delays: usize) -> f64 {
+        if delays >= self.delays.len() {
+            return now.t;
+        }
+        let delays = delays..self.delays.len();
+        delays
+            .fold(now.t, |t, delay| t - self.delay(delay, now.theta))
+            .max(0.0)
+    }
+
+    /// Returns the share of a step in which what is behind a delay moves; `None` for all of it.
+    pub fn moving(&self, now: &Now<'_>, delay: usize) -> Option<f64> {
+        let t = self.time(now, delay + 1);
+        let share = (t + now.dt - self.delay(delay, now.theta)) / now.dt;
+        (share < 1.0).then_some(share.max(0.0))
+    }
+
+    /// Returns whether what is behind the delays from this index on moves for most of the step: what moves at samples only waits for a
+    /// whole one.
+    #[inline]
+    pub fn moves(&self, now: &Now<'_>, delays: usize) -> bool {
+        let mut delays = delays..self.delays.len();
+        delays.all(|delay| self.moving(now, delay).is_none_or(|share| share >= 0.5))
+    }
+}

@@ -1,0 +1,296 @@
+//! Outputs, starts and inputs of composed equations.
+
+use super::parts::{Added, Theta};
+use super::{Composed, Disturbance, Entry, OutputChannel, SignalPart, TwinPart};
+use crate::record::{Drive, RecordError, Signal};
+use crate::twin::points::Layout;
+use crate::twin::{Now, SimulationError};
+
+/// Outputs of points that are kept on the stack.
+const SHORT: usize = 16;
+
+impl Composed {
+    /// Sets `y` to the outputs of the states `x` without noise, of one point or of several side by side.
+    pub fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        self.resolved(now, |now| {
+            self.own_outputs(now, x, y);
+            // Memories advance in `update`, once a sample; looking changes nothing.
+            if self.parts.acts.on_outputs {
+                for added in &self.parts.list {
+                    self.look(added, now, x, y);
+                }
+            }
+        });
+    }
+
+    /// Changes outputs of points by a part, its memory left as it is.
+    #[inline]
+    fn look(&self, added: &Added, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        let (n, p) = (self.states(), self.outputs());
+        match &added.part {
+            TwinPart::Sensor(part) if !part.is_of_readings => {
+                let now = self.behind(now, added.delays);
+                let on = part.channel(added);
+                part.magnitudes(&now, |m| {
+                    (part.change.law).peek(m, &now, &on, (Layout::dense(n), x), (p, y));
+                });
+            }
+            TwinPart::Disturbance(part) => {
+                if let Entry::Sensor(target) = part.entry {
+                    for (x, y) in x.chunks_exact(n).zip(y.chunks_exact_mut(p)) {
+                        y[target] += x[added.states.start];
+                    }
+                }
+            }
+            TwinPart::Unit(factor) => y.iter_mut().for_each(|y| *y *= factor),
+            _ => {}
+        }
+    }
+
+    /// Number of outputs.
+    #[inline]
+    pub(super) fn outputs(&self) -> usize {
+        self.parts.outline.outputs.len()
+    }
+
+    /// Time behind the delays from this index on.
+    #[inline]
+    fn behind<'n>(&self, now: &Now<'n>, delays: usize) -> Now<'n> {
+        Now {
+            t: self.parts.time(now, delays),
+            ..*now
+        }
+    }
+
+    fn own_outputs(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        let (n, p) = (self.states(), self.outputs());
+        let at = Layout {
+            states: self.parts.states,
+            stride: n,
+        };
+        if !self.parts.acts.by_states {
+            return self.inside(now, None, |own| self.own.observe_points(own, at, p, x, y));
+        }
+        for (x, y) in x.chunks_exact(n).zip(y.chunks_exact_mut(p)) {
+            self.inside(now, Some(x), |own| {
+                self.own.observe_points(own, at, p, x, y)
+            });
+        }
+    }
+
+    /// Advances the memories of sensors, so many points at once that their outputs need no heap.
+    pub(super) fn remember_signals(&self, now: &Now<'_>, x: &mut [f64]) {
+        let (n, p) = (self.states(), self.outputs());
+        let mut outputs = [0.0; SHORT];
+        let mut heap = vec![0.0; if p > SHORT { p } else { 0 }];
+        let y = if p > SHORT {
+            &mut heap
+        } else {
+            &mut outputs[..]
+        };
+        for x in x.chunks_mut(SHORT / p.min(SHORT) * n) {
+            let y = &mut y[..x.len() / n * p];
+            self.own_outputs(now, x, y);
+            for added in &self.parts.list {
+                match &added.part {
+                    TwinPart::Sensor(part)
+                        if !part.is_of_readings && self.parts.moves(now, added.delays) =>
+                    {
+                        let (at, on) = (self.behind(now, added.delays), part.channel(added));
+                        part.magnitudes(&at, |m| {
+                            (part.change.law).pass(m, &at, &on, (Layout::dense(n), x), (p, y));
+                        });
+                    }
+                    _ => self.look(added, now, x, y),
+                }
+            }
+        }
+    }
+
+    /// Changes outputs, of one point or of several, behind their noise; returns whether any changed.
+    pub(crate) fn readout(&self, now: &Now<'_>, y: &mut [f64]) -> bool {
+        self.resolved(now, |now| {
+            let p = self.outputs();
+            if !self.parts.acts.on_readings {
+                return self.inside(now, None, |own| self.own.readout_points(own, p, y));
+            }
+            for added in &self.parts.list {
+                if let TwinPart::Unit(factor) = added.part {
+                    y.iter_mut().for_each(|y| *y /= factor);
+                }
+            }
+            let mut changed = self.inside(now, None, |own| self.own.readout_points(own, p, y));
+            for added in &self.parts.list {
+                match &added.part {
+                    TwinPart::Unit(factor) => y.iter_mut().for_each(|y| *y *= factor),
+                    // Behind the noise nobody remembers.
+                    TwinPart::Sensor(part) if part.is_of_readings => {
+                        let before = Theta::from_slice(y);
+                        let (now, on) = (self.behind(now, added.delays), part.channel(added));
+                        let (m, states) = (part.change.m(now.theta), (Layout::dense(1), &[][..]));
+                        (part.change.law).peek(m, &now, &on, states, (p, y));
+                        changed |= before
+                            .iter()
+                            .zip(&*y)
+                            .any(|(a, b)| a.to_bits() != b.to_bits());
+                    }
+                    _ => {}
+                }
+            }
+            changed
+        })
+    }
+
+    /// Sets the first state.
+    pub fn start(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.resolved(now, |now| {
+            let (own, added) = x.split_at_mut(self.parts.states);
+            self.inside(now, None, |now| self.own.start(now, own));
+            added.fill(0.0);
+            for added in &self.parts.list {
+                if let TwinPart::Start { state, mean, .. } = &added.part {
+                    x[*state] = mean.value(now.theta);
+                }
+            }
+            self.begin(now, x);
+        });
+    }
+
+    /// Sets the states that follow from the others at the first sample: memories, to the first values of their signals.
+    pub(crate) fn begin(&self, now: &Now<'_>, x: &mut [f64]) {
+        if !self.parts.acts.in_sensors {
+            return;
+        }
+        self.resolved(now, |now| {
+            let mut y = Theta::from_elem(0.0, self.outputs());
+            self.own_outputs(now, x, &mut y);
+            for added in &self.parts.list {
+                if let TwinPart::Sensor(part) = &added.part {
+                    x[added.states.clone()].fill(y[part.target]);
+                }
+                self.look(added, now, x, &mut y);
+            }
+        });
+    }
+
+    /// Sets standard deviations of the first state; `std` comes zeroed.
+    pub(crate) fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]) {
+        self.resolved(now, |now| {
+            let own = &mut std[..self.parts.states];
+            self.inside(now, None, |now| self.own.start_deviation(now, own));
+            for added in &self.parts.list {
+                match &added.part {
+                    TwinPart::Start {
+                        state, std: own, ..
+                    } => std[*state] = *own,
+                    TwinPart::UncertainStart { state, std: own } if std[*state] == 0.0 => {
+                        std[*state] = *own;
+                    }
+                    TwinPart::Disturbance(part) => {
+                        let share = Disturbance::started(part.memory);
+                        std[added.states.start] = share * now.theta[part.sigma];
+                    }
+                    _ => {}
+                }
+            }
+        });
+    }
+
+    /// Returns whole samples by which each output shows late what [`observe`](Self::observe) says; empty where none is. A run holds the
+    /// outputs back before their noise, the first ones in place of those before the start; a filter takes the record's values so much
+    /// earlier.
+    pub(crate) fn dead_time(&self, theta: &[f64], dt: f64) -> Vec<usize> {
+        let mut all = vec![];
+        for added in &self.parts.list {
+            if let TwinPart::Sensor(part) = &added.part
+                && part.is_dead_time
+            {
+                all.resize(self.outputs(), 0);
+                let theta = self.complete(theta);
+                all[part.target] += whole_samples(part.change.m(&theta)[0], dt);
+            }
+        }
+        all
+    }
+
+    /// Returns the drive behind the actuators; `None` where inputs act as they are recorded. Inputs do not depend on states, so that
+    /// filters need no states for what actuators remember.
+    pub(crate) fn actuated(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<Drive>, SimulationError> {
+        let mut acting: Option<Drive> = None;
+        let theta = self.complete(theta);
+        for added in self.parts.list.iter().rev() {
+            let before = acting.as_ref().unwrap_or(drive);
+            acting = Some(match &added.part {
+                TwinPart::Actuator(part) => part.act(&theta, before)?,
+                TwinPart::Late(_) => (before.late(self.parts.delay(added.delays, &theta)))
+                    .map_err(|error| SimulationError::Fatal(error.into()))?,
+                _ => continue,
+            });
+        }
+        Ok(acting)
+    }
+}
+
+impl SignalPart {
+    /// Calls `then` with its magnitudes; a dead time loses its whole samples.
+    #[inline]
+    fn magnitudes<R>(&self, now: &Now<'_>, then: impl FnOnce(&[f64]) -> R) -> R {
+        let m = self.change.m(now.theta);
+        match self.is_dead_time {
+            true => then(&[m[0] - whole_samples(m[0], now.dt) as f64 * now.dt]),
+            false => then(m),
+        }
+    }
+
+    #[inline]
+    fn channel(&self, added: &Added) -> OutputChannel {
+        OutputChannel {
+            memory: added.states.clone(),
+            target: self.target,
+        }
+    }
+
+    /// Passes its channel of a whole signal through the law.
+    pub(super) fn pass(&self, theta: &[f64], drive: &Drive, signal: &mut Signal) {
+        let m = self.change.m(theta);
+        let mut memory = vec![signal[[0, self.target]]; self.memory];
+        let on = OutputChannel {
+            memory: 0..self.memory,
+            target: 0,
+        };
+        let at = Layout::dense(self.memory.max(1));
+        memory.resize(self.memory.max(1), 0.0);
+        for (k, value) in signal.column_mut(self.target).iter_mut().enumerate() {
+            let now = Now::new(drive.time(k), drive.step(k), drive.input(k), theta);
+            let value = std::slice::from_mut(value);
+            (self.change.law).pass(m, &now, &on, (at, &mut memory), (1, value));
+        }
+    }
+
+    /// Returns the drive behind this part.
+    pub(super) fn act(&self, theta: &[f64], drive: &Drive) -> Result<Drive, SimulationError> {
+        let mut inputs = drive.inputs().clone();
+        self.pass(theta, drive, &mut inputs);
+        drive.with_inputs(inputs).map_err(|error| match error {
+            RecordError::NotFinite { sample, .. } => SimulationError::Diverged {
+                at: drive.time(sample),
+            },
+            error => SimulationError::Fatal(error.into()),
+        })
+    }
+}
+
+/// Samples that a dead time reaches back at most.
+pub(crate) const LONGEST_DEAD_TIME: usize = 63;
+
+/// Whole samples of a dead time; what is left lies between 0.37 and 1.37 samples, or is all of a shorter one. Delays are often whole
+/// numbers of samples: from there, the number does not change under the small steps of a derivative.
+fn whole_samples(delay: f64, dt: f64) -> usize {
+    (delay / dt - 0.37)
+        .floor()
+        .clamp(0.0, LONGEST_DEAD_TIME as f64) as usize
+}
