@@ -276,7 +276,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     let files = sources.sources.values();
     let files = files.map(|source| source.file.display().to_string());
     vec![
-        Ratchet::new("public items", 151, items.collect()),
+        Ratchet::new("public items", 153, items.collect()),
         Ratchet::new("error types", 13, errors),
         Ratchet::new("lines of code", 49_900, lines),
         Ratchet::new("files", 480, files.collect()),
