@@ -108,7 +108,7 @@ impl Solver<'_> {
             })
             .ctrlc(false)
             .run()
-            .map_err(evaluation_error)?
+            .map_err(evaluation_error::<O::Error>)?
             .state;
         let converged = TerminationStatus::Terminated(TerminationReason::SolverConverged);
         let cost = state.get_cost();
