@@ -127,7 +127,7 @@ fn a_step_that_is_too_long_is_named_by_output() {
         "its noise is 0.05 V",
         "y2 moves by",
         "1 % of its deviation is",
-        "substeps = 4",
+        "4 substeps",
     ] {
         assert!(stiff.message.contains(part), "{}", stiff.message);
     }
