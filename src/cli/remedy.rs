@@ -146,6 +146,7 @@ impl Remedy for EstimatorError {
             Self::Record { error, .. } => return error.remedy(),
             Self::Study(error) => return error.remedy(),
             Self::Work(error) => return error.remedy(),
+            Self::NoEstimator { .. } => "`truetwin pretrain` makes one".into(),
             Self::Whitening(_) => "[noise] of the study file".into(),
             _ => return None,
         })

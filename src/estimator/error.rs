@@ -82,6 +82,14 @@ pub enum EstimatorError {
         /// Problem and remedy.
         problem: String,
     },
+    /// A file holds no estimator, or one that this program cannot use.
+    #[error("{}: {problem}", path.display())]
+    NoEstimator {
+        /// File.
+        path: PathBuf,
+        /// Problem and remedy.
+        problem: String,
+    },
     /// The features simulated at an estimate have no covariance.
     #[error(
         "the features simulated at the estimate cannot be whitened: {0}; a twin without noise has no statistics: give it noise levels"

@@ -13,7 +13,7 @@ use crate::estimator::settings::Settings;
 use crate::feature::FeatureRecipe;
 use crate::network::{Architecture, NamedTensor, bytes_of, values_of};
 use crate::storage::files::{replace, sha256, write_new};
-use crate::storage::untrusted::read;
+use crate::storage::untrusted::{message, read};
 use crate::study::StudyFile;
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
@@ -51,7 +51,10 @@ impl Estimator {
     {
         let known: Vec<Project> = known.iter().map(Into::into).collect();
         let bytes = read(path, LONGEST).map_err(|error| EstimatorError::io(path, error))?;
-        restored(&bytes, path, &known).map_err(|problem| EstimatorError::file(path, problem))
+        restored(&bytes, path, &known).map_err(|problem| EstimatorError::NoEstimator {
+            path: path.into(),
+            problem: message(&problem),
+        })
     }
 }
 
