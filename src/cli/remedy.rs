@@ -146,7 +146,11 @@ impl Remedy for EstimatorError {
             Self::Record { error, .. } => return error.remedy(),
             Self::Study(error) => return error.remedy(),
             Self::Work(error) => return error.remedy(),
-            Self::NoEstimator { .. } => "`truetwin pretrain` makes one".into(),
+            Self::NoBank { .. } => "`truetwin bank` makes one, and mends it if called again".into(),
+            Self::NoEstimator { .. } => {
+                "`truetwin pretrain` makes one; --program or --fmu names the twin that it was made for"
+                    .into()
+            }
             Self::Whitening(_) => "[noise] of the study file".into(),
             _ => return None,
         })

@@ -82,6 +82,14 @@ pub enum EstimatorError {
         /// Problem and remedy.
         problem: String,
     },
+    /// A file or folder holds no whole bank.
+    #[error("{}: {problem}", path.display())]
+    NoBank {
+        /// File or folder.
+        path: PathBuf,
+        /// Problem and remedy.
+        problem: String,
+    },
     /// A file holds no estimator, or one that this program cannot use.
     #[error("{}: {problem}", path.display())]
     NoEstimator {
@@ -125,7 +133,7 @@ impl EstimatorError {
     /// A file that holds no bank, or a damaged one.
     pub(crate) fn no_bank(path: &Path, reason: &str, remedy: &str) -> Self {
         let reason = message(reason);
-        Self::File {
+        Self::NoBank {
             path: path.into(),
             problem: format!("no bank ({reason}); {remedy}"),
         }

@@ -160,7 +160,10 @@ impl Shards {
         let (there, of) = (self.there.len(), self.of);
         let problem =
             format!("{there} of {of} shards are there; make the same bank again to add the others");
-        EstimatorError::file(self.folder.path(), problem)
+        EstimatorError::NoBank {
+            path: self.folder.path().into(),
+            problem,
+        }
     }
 
     /// Returns the error of a shard whose rows are wider or narrower than those of the first.
@@ -172,7 +175,7 @@ impl Shards {
     pub fn is_sound(&self, number: usize) -> Result<bool, EstimatorError> {
         match self.bytes(number) {
             Ok(_) => Ok(true),
-            Err(EstimatorError::File { .. }) => Ok(false),
+            Err(EstimatorError::NoBank { .. }) => Ok(false),
             // A file that cannot be read now may be sound.
             Err(error) => Err(error),
         }
