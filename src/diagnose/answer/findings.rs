@@ -76,13 +76,17 @@ fn places(terms: &[Arc<Term>]) -> Places {
 }
 
 /// Returns whether an effect is a function of the same variable at the same place, so that an unknown function there is the effect in
-/// another form.
+/// another form. The variable of a lag, a delay or a play is the signal's past.
 fn holds(function: &Term, effect: &Term) -> bool {
     let Part::Effect { effect: law, .. } = &effect.part else {
         return false;
     };
     if !effect.places().contains(&function.target.as_str()) {
         return false;
+    }
+    let has_memory = law.kind().memory_values() > 0;
+    if function.nature == Nature::Past {
+        return has_memory;
     }
     let [(variable, ..)] = function.variables.as_slice() else {
         return false;
@@ -97,7 +101,9 @@ fn holds(function: &Term, effect: &Term) -> bool {
         TargetKind::State => law.entry().from.as_deref().unwrap_or(law.target()) == variable,
         TargetKind::Parameter => of_time,
         TargetKind::Sensor | TargetKind::Actuator => {
-            function.nature == Nature::Function && of_time == (law.id() == "sensor-drift")
+            function.nature == Nature::Function
+                && !has_memory
+                && of_time == (law.id() == "sensor-drift")
         }
     }
 }
