@@ -123,7 +123,7 @@ impl Remedy for StudyError {
                 number(*expected)
             ),
             Self::OtherStep { given, expected } => format!(
-                "--step-of-record takes it, for `estimate` if the features are scores; `truetwin resample R.csv --step {} --out R2.csv`; [record] step = {} in the study file",
+                "--step-of-record takes it, for `estimate` if the features are scores; `truetwin resample R.csv --step {} --out R2.csv`; [record] step = {} in the study file, and pretrain again where an estimator is used",
                 number(*expected),
                 number(*given)
             ),

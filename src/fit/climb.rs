@@ -58,6 +58,7 @@ pub(crate) fn climb(
         longest: problem.axes.iter().map(|axis| axis.longest).collect(),
         held: problem.axes.iter().map(|axis| axis.held).collect(),
         iterations: iterations as u64,
+        trials: 1,
         damping: DAMPING,
         least_damping: LEAST_DAMPING,
         gain: problem.done(),

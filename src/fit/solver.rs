@@ -77,8 +77,9 @@ pub(super) struct Solver<'a> {
     pub longest: Vec<f64>,
     /// Entries that stay.
     pub held: Vec<bool>,
-    /// Trial points at most.
+    /// Iterations at most, and trial points of each: damping grows from one to the next, until one lowers the cost.
     pub iterations: u64,
+    pub trials: usize,
     /// Damping of the first step, and the least one.
     pub damping: f64,
     pub least_damping: f64,
@@ -170,15 +171,49 @@ impl Solver<'_> {
         }
     }
 
-    /// More damping; the search ends where it is of no use.
-    fn rejected(&mut self, state: SearchState) -> SearchState {
+    /// More damping; `false` where it is of no use.
+    fn damps_more(&mut self) -> bool {
         self.damping = (8.0 * self.damping).max(REJECTED_DAMPING);
-        match self.damping < MOST_DAMPING {
-            true => state,
-            false => state.terminate_with(TerminationReason::SolverExit(
-                "no step lowers the cost".into(),
-            )),
+        self.damping < MOST_DAMPING
+    }
+
+    /// The first of the trial points that lowers the cost.
+    fn trial<O: Objective>(
+        &mut self,
+        problem: &mut Problem<&O>,
+        state: &SearchState,
+    ) -> Result<Trial<O>, argmin::core::Error> {
+        let cost = state.get_cost();
+        let (x, gradient, information) = (state.get_param())
+            .zip(state.get_gradient())
+            .zip(state.get_hessian())
+            .map(|((x, gradient), information)| (x, gradient, information))
+            .ok_or_else(lost)?;
+        let enough = self.gain + self.relative_gain * cost;
+        for _ in 0..self.trials {
+            match self.step(x, gradient, information) {
+                DampedStep::Nowhere => return Ok(Trial::Ends(CONVERGED)),
+                DampedStep::Singular => {}
+                DampedStep::To(step) => {
+                    let next = self.clamp(&(x + &step));
+                    let moved = (&next - x).amax();
+                    if moved < self.least_step || -gradient.dot(&step) < PROMISE * enough {
+                        return Ok(Trial::Ends(CONVERGED));
+                    }
+                    // The cost alone tells whether to go there; the derivatives follow if so.
+                    let there =
+                        problem.problem("costs", |o| Ok(tolerated::<O, _>(o.cost(&next))?))?;
+                    if let Some((there, trial)) = there.filter(|(there, _)| *there < cost) {
+                        return Ok(Trial::Lower(next, there, trial));
+                    }
+                }
+            }
+            if !self.damps_more() {
+                let reason = TerminationReason::SolverExit("no step lowers the cost".into());
+                return Ok(Trial::Ends(reason));
+            }
         }
+        Ok(Trial::Higher)
     }
 }
 
@@ -188,6 +223,14 @@ enum DampedStep {
     Nowhere,
     /// The damped matrix has no root.
     Singular,
+}
+
+/// Outcome of the trial points of an iteration.
+enum Trial<O: Objective> {
+    /// The point, its cost, and what its evaluation leaves.
+    Lower(DVector<f64>, f64, O::Trial),
+    Higher,
+    Ends(TerminationReason),
 }
 
 const CONVERGED: TerminationReason = TerminationReason::SolverConverged;
@@ -213,26 +256,11 @@ impl<O: Objective> ArgminSolver<&O, SearchState> for Solver<'_> {
         state: SearchState,
     ) -> Result<(SearchState, Option<KV>), argmin::core::Error> {
         let cost = state.get_cost();
-        let (x, gradient, information) = (state.get_param())
-            .zip(state.get_gradient())
-            .zip(state.get_hessian())
-            .map(|((x, gradient), information)| (x, gradient, information))
-            .ok_or_else(lost)?;
-        let step = match self.step(x, gradient, information) {
-            DampedStep::To(step) => step,
-            DampedStep::Nowhere => return Ok((state.terminate_with(CONVERGED), None)),
-            DampedStep::Singular => return Ok((self.rejected(state), None)),
-        };
-        let next = self.clamp(&(x + &step));
-        let moved = (&next - x).amax();
         let enough = self.gain + self.relative_gain * cost;
-        if moved < self.least_step || -gradient.dot(&step) < PROMISE * enough {
-            return Ok((state.terminate_with(CONVERGED), None));
-        }
-        // The cost alone tells whether to go there; the derivatives follow if so.
-        let trial = problem.problem("costs", |o| Ok(tolerated::<O, _>(o.cost(&next))?))?;
-        let Some((there, trial)) = trial.filter(|(there, _)| *there < cost) else {
-            return Ok((self.rejected(state), None));
+        let (next, there, trial) = match self.trial(problem, &state)? {
+            Trial::Lower(next, there, trial) => (next, there, trial),
+            Trial::Higher => return Ok((state, None)),
+            Trial::Ends(reason) => return Ok((state.terminate_with(reason), None)),
         };
         self.damping = (0.1 * self.damping).max(self.least_damping);
         let arrived = cost - there < enough;

@@ -42,7 +42,7 @@ pub trait ResidualProblem {
 /// Source: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator", section IV, step 2.
 #[derive(Debug, Clone)]
 pub struct GaussNewton {
-    /// Trial points at most; each that helps costs a Jacobian.
+    /// Jacobians at most.
     pub max_iterations: u64,
     /// Singular values of J̃ below this share of the largest are left out; 1e-3 for noisy Jacobians.
     pub relative_cutoff: f64,
@@ -56,6 +56,8 @@ pub struct GaussNewton {
 
 /// Damping from the start: residuals are taken at their word until a step fails.
 const DAMPING: f64 = 1e-9;
+/// Trial points after each Jacobian: damping grows eightfold from one to the next and is of no use long before the last.
+const TRIALS: usize = 30;
 
 impl Default for GaussNewton {
     fn default() -> Self {
@@ -110,6 +112,7 @@ impl GaussNewton {
             longest: vec![self.max_step.unwrap_or(f64::INFINITY); start.len()],
             held: vec![false; start.len()],
             iterations: self.max_iterations,
+            trials: TRIALS,
             damping: DAMPING,
             least_damping: DAMPING,
             gain: 0.0,

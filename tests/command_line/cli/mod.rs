@@ -556,7 +556,7 @@ fn a_study_with_an_input_file_has_its_step() {
     );
     refused(
         &["check", "--study", &other],
-        &["contradicts", "60 samples, step 1 s"],
+        &["contradict", "60 samples, step 1 s"],
     );
 }
 

@@ -61,7 +61,7 @@ fn a_program_that_describes_nothing_is_late_after_the_time_out() {
     let begun = Instant::now();
     let error = started("mute.py", "import time; time.sleep(60)", impatient());
     let message = error.unwrap_err().to_string();
-    for part in ["mute.py", "no answer within 1.5 s", "--timeout"] {
+    for part in ["mute.py", "no answer within 1.5 s", "time-out"] {
         assert!(message.contains(part), "{message}");
     }
     assert!(begun.elapsed() < Duration::from_secs(10));
