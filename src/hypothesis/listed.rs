@@ -14,6 +14,10 @@ use std::collections::BTreeMap;
 /// size of the library, folds the output at a half.
 const LARGE: [f64; 4] = [0.3, 0.6, 0.9, 1.0];
 
+/// Frequencies in 1/T that are tried: half a cycle apart, since a gain falls off within one; the slow ones in any case, up to eight cycles.
+pub(super) const FREQUENCIES_PER_CYCLE: f64 = 2.0;
+const SLOW: usize = 16;
+
 /// Nats for a mark that outputs bear, such as repeated values of a quantiser.
 const MARK_PRESENT: f64 = 12.0;
 
@@ -115,12 +119,13 @@ impl Library<'_> {
         let Some(first) = free.first() else {
             return Ok(None);
         };
+        let frequencies = self.with_slow_ones();
         let ranges = Ranges {
             effect: &effect,
             values,
             dt: self.scales.dt(),
             duration: self.scales.duration(),
-            frequencies: self.frequencies,
+            frequencies: &frequencies,
         };
         let space = twin.parameters();
         let entries: Vec<usize> = (term.names().iter())
@@ -149,6 +154,16 @@ impl Library<'_> {
         }
         term.starts.extend(small);
         Ok((term.axes.iter().all(|a| a.bounds.low() <= a.bounds.high())).then_some(term))
+    }
+
+    /// The frequencies and slow ones: θ answers a slow wave, so that residuals hardly show it.
+    fn with_slow_ones(&self) -> Vec<f64> {
+        let cycle = FREQUENCIES_PER_CYCLE * self.scales.duration();
+        let slow = (2..=SLOW).map(|i| i as f64 / cycle);
+        let mut all: Vec<f64> = slow.chain(self.frequencies.iter().copied()).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
     }
 
     /// The size of entry `j` at which the effect is as large as the twin's own terms; all `entries` of the effect are off or in the middle of

@@ -29,7 +29,8 @@ fn log_evidence(study: &Study, effects: &str, record: &Record) -> f64 {
     let study = study.configure(&file).unwrap();
     let fit = study.fit(std::slice::from_ref(record));
     let evidence = fit.ok().and_then(|fit| fit.evidence);
-    evidence.map_or(f64::NAN, |evidence| evidence.log_evidence)
+    // That of a diagnosis is not corrected by draws.
+    evidence.map_or(f64::NAN, |evidence| evidence.laplace)
 }
 
 /// The tables of an effect's ways: of several thresholds, one is used at a time.

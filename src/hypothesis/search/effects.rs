@@ -7,7 +7,7 @@ use crate::effect::Effect;
 use crate::fit::axis::Axis;
 use crate::fit::problem::Problem;
 use crate::fit::{Searched, fits};
-use crate::hypothesis::listed::Library;
+use crate::hypothesis::listed::{FREQUENCIES_PER_CYCLE, Library};
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::shared;
 use crate::hypothesis::term::{Part, Term};
@@ -18,9 +18,7 @@ use crate::twin::{Noise, ParameterSpace, Role};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Frequencies in 1/T that are tried beside those of the residuals: half a cycle apart, since a gain falls off within one; up to a fifth of
-/// the sampling rate.
-const FREQUENCIES_PER_CYCLE: f64 = 2.0;
+/// Highest frequency that is tried beside those of the residuals, in sampling rates.
 const HIGHEST: f64 = 0.2;
 /// Most of them; a longer record has them closer together and more of them, each of more samples.
 const MOST: usize = 2000;

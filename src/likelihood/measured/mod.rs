@@ -20,7 +20,7 @@ pub(crate) use level::{Beliefs, Level, Measured};
 use super::ensemble;
 use super::kalman::FilterError;
 use crate::record::Record;
-use crate::twin::{Composed, Twin, TwinError, fix};
+use crate::twin::{Composed, ParameterSpace, Role, Twin, TwinError, fix};
 use level::build;
 use motion::{followed_motion, free_motion, size};
 use std::collections::BTreeMap;
@@ -79,13 +79,24 @@ pub(crate) fn with_levels(
     fix(measured.twin, &held.collect())
 }
 
+/// The prior's centre, sizes, lags and delays of effects at zero: what the twin's own motion tells must not hang on a guess of these, and the
+/// centre of a delay's prior may be longer than its law keeps.
+fn without_effects(space: &ParameterSpace) -> Vec<f64> {
+    (space.iter().zip(space.centre()))
+        .map(|(p, centre)| match p.role {
+            Role::Magnitude => p.bounds.clamp(0.0),
+            _ => centre,
+        })
+        .collect()
+}
+
 fn measured_equations(
     base: &Composed,
     records: &[Record],
     beliefs: &Beliefs,
 ) -> Result<Measured, FilterError> {
     let outline = base.outline();
-    let theta = outline.parameters.centre();
+    let theta = without_effects(&outline.parameters);
     let size_of = |column: &dyn Fn(&Record) -> Vec<f64>| -> f64 {
         records.iter().map(|r| size(&column(r))).fold(0.0, f64::max)
     };
