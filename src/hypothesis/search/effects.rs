@@ -49,8 +49,10 @@ pub(crate) fn searched(
     for (j, value) in without.iter_mut().enumerate().take(space.len()) {
         *value = ends.get(&space[j].name).copied().unwrap_or(*value);
     }
-    let grown = grown(model, terms)?.fitted.theta;
-    let initial = [grown, without].map(|theta| problem.clamp(&theta));
+    let initial: Vec<Vec<f64>> = (grown(model, terms, noise)?.into_iter())
+        .chain([without])
+        .map(|theta| problem.clamp(&theta))
+        .collect();
     Ok(Searched {
         fits: fits(&problem, &initial, noise)?,
         problem,
@@ -121,19 +123,34 @@ fn opened(model: &Model, terms: &[Arc<Term>]) -> (Problem, BTreeMap<String, f64>
     (problem, off)
 }
 
-/// The twin with one effect more at a time, as long as one can be fitted.
-fn grown(mut model: Model, mut terms: Vec<Arc<Term>>) -> Result<Model, FilterError> {
+/// Ends of fits with one effect more at a time, as long as one can be fitted, the last one first; beside each of them, those with another
+/// effect in the place of the one that explains most.
+fn grown(
+    mut model: Model,
+    mut terms: Vec<Arc<Term>>,
+    noise: Noise,
+) -> Result<Vec<Vec<f64>>, FilterError> {
     let breadth = Breadth::of(&model, false).thorough();
+    let mut others = vec![];
     while !terms.is_empty() {
         let found = listed(&model, &terms, &[], breadth)?;
-        let best = (found.into_iter()).find_map(|found| Some((found.last().clone(), found.model?)));
-        let Some((term, better)) = best else {
+        let mut fitted =
+            (found.into_iter()).filter_map(|found| Some((found.last().clone(), found.model?)));
+        let Some((term, better)) = fitted.next() else {
             break;
         };
+        others.extend(fitted.map(|(_, other)| other.fitted.theta));
         terms.retain(|other| !Arc::ptr_eq(other, &term));
         model = better;
+        if !terms.is_empty() {
+            // As thorough as if these effects were all: with one effect more no fit is worse.
+            let fits = fits(&model.problem, &[model.fitted.theta.clone()], noise)?;
+            let best = fits.into_iter().next();
+            model = (best.and_then(|best| model.refitted(best))).unwrap_or(model);
+        }
     }
-    Ok(model)
+    others.insert(0, model.fitted.theta);
+    Ok(others)
 }
 
 /// The problem with other axes of the twin's parameters.
