@@ -3,6 +3,7 @@
 //! `cargo run --release --example embed`
 
 use ndarray::Array2;
+use std::slice;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use truetwin::prelude::*;
@@ -36,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let record = Record::from_views(0.05, no_input.view(), measured.view())?;
 
     let study = Study::of(VanDerPol)?;
-    let nu = &study.fit(&[record.clone()])?.parameters[0];
+    let nu = &study.fit(slice::from_ref(&record))?.parameters[0];
     println!(
         "nu {:.3}, {:.3} to {:.3} (truth 3)",
         nu.value, nu.low, nu.high
@@ -49,10 +50,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         quick: true,
         ..DiagnoseSettings::default()
     };
-    let diagnosis = diagnose(&study, &[record.clone()], None, &quick, &progress)?;
+    let diagnosis = diagnose(&study, slice::from_ref(&record), None, &quick, &progress)?;
     println!("{:?}", diagnosis.verdict);
     window.stop.store(true, Ordering::Relaxed);
-    match diagnose(&study, &[record], None, &quick, &progress) {
+    match diagnose(&study, slice::from_ref(&record), None, &quick, &progress) {
         Err(error) => println!("stopped: {error}"),
         Ok(_) => return Err("the stop button did nothing".into()),
     }

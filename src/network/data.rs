@@ -121,7 +121,7 @@ enum FeedRows {
     InMemory {
         data: Data,
         training: Vec<usize>,
-        held_out: Data,
+        held_out: Box<Data>,
     },
     Streamed {
         /// Rows of each part.
@@ -163,10 +163,10 @@ impl<'a> Feed<'a> {
         let rows = if sizes.len() < 2 || count <= most {
             let data = together(read, 0..sizes.len())?;
             let (training, held_out) = split(count, share, seed)?;
-            let held_out = Data {
+            let held_out = Box::new(Data {
                 features: data.features.select(Axis(0), &held_out),
                 targets: data.targets.select(Axis(0), &held_out),
-            };
+            });
             FeedRows::InMemory {
                 data,
                 training,

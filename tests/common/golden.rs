@@ -52,7 +52,7 @@ pub(crate) fn worse(cases: &[Case]) -> Vec<String> {
                 continue;
             };
             line += &format!("; {key} {:+.3}", value - before);
-            if !(value > before - BELOW) {
+            if value.is_nan() || value <= before - BELOW {
                 worse.push(format!("{}: {key} {before:.3} -> {value:.3}", case.name));
             }
         }

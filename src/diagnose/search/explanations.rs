@@ -256,8 +256,8 @@ impl Explanations {
             Some(with_noise) => with_noise,
             None => {
                 let best = self.listed().into_iter().next()?;
-                let all = self.noise_beside(best).into_iter();
-                all.filter(|e| are_outliers_elsewhere(e, best)).next()?
+                let mut all = self.noise_beside(best).into_iter();
+                all.find(|e| are_outliers_elsewhere(e, best))?
             }
         };
         let single = self.get(&TermSet::of(&with_noise.terms[..1]))?;

@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
+/// Purpose and names of a question.
+type Asked = (Purpose, Vec<String>);
+
 /// Evidence by a table: names begin with e (effect), f (function) or n (noise); a set that is not in the table is a nat worse than that
 /// without its last term.
 #[derive(Clone, Default)]
@@ -25,7 +28,7 @@ struct Table {
     /// The table with another kind of noise, or with a finer step.
     changed: Option<Box<Table>>,
     step: Option<FinerStep>,
-    asked: Arc<Mutex<Vec<(Purpose, Vec<String>)>>>,
+    asked: Arc<Mutex<Vec<Asked>>>,
 }
 
 fn term(name: &str) -> Arc<Term> {

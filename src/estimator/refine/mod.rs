@@ -17,8 +17,6 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-#[cfg(test)]
-pub(crate) use information::Direction;
 pub(crate) use information::FeatureInformation;
 pub use settings::RefineSettings;
 

@@ -228,7 +228,7 @@ fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Resul
                     false => a,
                 }
             });
-            Ok(best.map(|model| Explanation::of(model)))
+            Ok(best.map(Explanation::of))
         })
         .collect::<Result<_, FilterError>>()?;
     for (own, better) in all.iter_mut().zip(better) {

@@ -177,7 +177,7 @@ impl Extended {
 
     /// Slope and information at θ, without a step.
     pub fn at(&self, theta: &[f64]) -> Result<Option<Fitted>, FilterError> {
-        Ok(climb(&self.problem, theta, 0)?)
+        climb(&self.problem, theta, 0)
     }
 
     /// The problem with the priors of coefficients and sizes that an approximation found most probable.
