@@ -147,6 +147,7 @@ impl Remedy for EstimatorError {
             Self::Study(error) => return error.remedy(),
             Self::Work(error) => return error.remedy(),
             Self::NoBank { .. } => "`truetwin bank` makes one, and mends it if called again".into(),
+            Self::TooLarge { .. } => "`truetwin bank` makes one".into(),
             Self::NoEstimator { .. } => {
                 "`truetwin pretrain` makes one; --program or --fmu names the twin that it was made for"
                     .into()

@@ -63,6 +63,16 @@ pub enum EstimatorError {
     /// The bank cannot be made, merged, or used for this study.
     #[error("{0}")]
     Bank(String),
+    /// A bank that does not fit into memory.
+    #[error(
+        "bank size = {size}; at most {most} fit into memory: make a bank on disk, then pretrain from it"
+    )]
+    TooLarge {
+        /// Rows that were asked for.
+        size: usize,
+        /// Most rows in memory.
+        most: usize,
+    },
     /// The network cannot take these features.
     #[error("{0}")]
     Inputs(String),

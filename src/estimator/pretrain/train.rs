@@ -96,9 +96,10 @@ impl<'a> PretrainPlan<'a> {
     pub fn size_in_memory(&self) -> Result<usize, EstimatorError> {
         match self.settings.bank_size {
             size if size <= MOST_IN_MEMORY => Ok(size),
-            size => Err(EstimatorError::Bank(format!(
-                "bank size = {size}; at most {MOST_IN_MEMORY} fit into memory: make a bank on disk, then pretrain from it"
-            ))),
+            size => Err(EstimatorError::TooLarge {
+                size,
+                most: MOST_IN_MEMORY,
+            }),
         }
     }
 
