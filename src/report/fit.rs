@@ -132,7 +132,11 @@ fn off(fit: &Fit) -> Option<f64> {
 
 fn headline(fit: &Fit) -> String {
     let (count, samples) = (fit.parameters.len(), fit.samples);
-    let fitted = format!("{count} parameters fitted to {samples} samples");
+    let parameters = match count {
+        1 => "parameter",
+        _ => "parameters",
+    };
+    let fitted = format!("{count} {parameters} fitted to {samples} samples");
     match off(fit) {
         _ if !fit.convergence.converged => {
             format!("Not converged: {fitted}, the search has not arrived.")
@@ -140,7 +144,7 @@ fn headline(fit: &Fit) -> String {
         None => format!("{fitted}: the free run diverges."),
         Some(off) if off >= 1.0 => format!("{fitted}: the free run does not follow the record."),
         Some(off) => format!(
-            "{fitted}: the free run follows the record, with an error of {} of its deviation.",
+            "{fitted}: the free run follows the record, error {} of its deviation.",
             percent(off)
         ),
     }

@@ -14,7 +14,7 @@ impl Document {
     pub fn html(&self) -> String {
         let title = escaped(&self.title);
         let byline = tagged("p class=\"byline\"", &self.byline);
-        let answer = all(&self.answer);
+        let answer = all(&self.title, &self.answer);
         let picture = self.picture.as_ref().map_or(String::new(), Picture::html);
         let contents: String = (self.sections.iter())
             .map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, escaped(s.title)))
@@ -40,15 +40,24 @@ impl Document {
 impl Section {
     fn html(&self) -> String {
         let (id, title) = (self.id, escaped(self.title));
-        let (brief, rest) = (all(&self.brief), all(&self.rest));
+        let [brief, rest] = [&self.brief, &self.rest].map(|blocks| all(self.title, blocks));
         format!(
             "<section id=\"{id}\" aria-labelledby=\"{id}-heading\">\n<h2 id=\"{id}-heading\">{title}</h2>\n{brief}{rest}</section>\n"
         )
     }
 }
 
-fn all(blocks: &[Block]) -> String {
-    blocks.iter().map(Block::html).collect()
+/// Blocks below a heading.
+fn all(heading: &str, blocks: &[Block]) -> String {
+    let mut heading = heading;
+    let mut page = String::new();
+    for block in blocks {
+        if let Block::Heading(text) = block {
+            heading = text;
+        }
+        page += &block.html(heading);
+    }
+    page
 }
 
 /// A text in a tag, which may have attributes; nothing of an empty one.
@@ -68,7 +77,8 @@ fn list<'i>(class: &str, items: impl Iterator<Item = &'i str>) -> String {
 }
 
 impl Block {
-    fn html(&self) -> String {
+    /// A block below this heading.
+    fn html(&self, heading: &str) -> String {
         match self {
             Self::Headline(text) => tagged("p class=\"verdict\"", text),
             Self::Paragraph(text) => tagged("p", text),
@@ -84,13 +94,13 @@ impl Block {
                     .collect();
                 list(" class=\"doubts\"", items.iter().map(String::as_str))
             }
-            Self::Table(table) => table.html(),
-            Self::Matrix(matrix) => matrix.html(),
+            Self::Table(table) => table.html(heading),
+            Self::Matrix(matrix) => matrix.html(heading),
             Self::Picture(picture) => picture.html(),
             Self::Folded(summary, blocks) => format!(
                 "<details>\n{}{}</details>\n",
                 tagged("summary", summary),
-                all(blocks)
+                all(summary, blocks)
             ),
         }
     }
@@ -103,13 +113,17 @@ fn scrolling(what: &str, body: &str) -> String {
     )
 }
 
+/// The caption of a table; one that its heading describes has the heading, for those who hear the page.
+fn caption(text: &str, heading: &str) -> String {
+    match text {
+        "" => format!("<caption class=\"heard\">{}</caption>", escaped(heading)),
+        text => format!("<caption><span>{}</span></caption>", escaped(text)),
+    }
+}
+
 fn scrolling_table(class: &str, caption: &str, head: &str, rows: &str) -> String {
-    let caption = match escaped(caption) {
-        text if text.is_empty() => text,
-        text => format!("<caption><span>{text}</span></caption>\n"),
-    };
     let table = format!(
-        "<table{class}>\n{caption}<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n"
+        "<table{class}>\n{caption}\n<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n"
     );
     scrolling("Table", &table)
 }
@@ -123,7 +137,7 @@ impl Picture {
 }
 
 impl Table {
-    fn html(&self) -> String {
+    fn html(&self, heading: &str) -> String {
         let class = |kind: Column| match kind {
             Column::Text => "",
             Column::Number => " class=\"n\"",
@@ -144,12 +158,12 @@ impl Table {
             format!("<tr>{cells}</tr>\n")
         };
         let rows: String = self.rows.iter().map(row).collect();
-        scrolling_table("", &self.caption, &head, &rows)
+        scrolling_table("", &caption(&self.caption, heading), &head, &rows)
     }
 }
 
 impl Matrix {
-    fn html(&self) -> String {
+    fn html(&self, heading: &str) -> String {
         let head: String = (self.head.iter())
             .map(|name| format!("<th scope=\"col\" class=\"turned\">{}</th>", escaped(name)))
             .collect();
@@ -160,7 +174,8 @@ impl Matrix {
             })
             .collect();
         let head = format!("<td></td>{head}");
-        scrolling_table(" class=\"matrix\"", &self.caption, &head, &rows)
+        let caption = caption(&self.caption, heading);
+        scrolling_table(" class=\"matrix\"", &caption, &head, &rows)
     }
 }
 

@@ -63,6 +63,7 @@ pub(crate) enum Block {
 /// A table; the first cell of a row names it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Table {
+    /// Empty where the heading above says it.
     pub caption: String,
     pub head: Vec<(String, Column)>,
     pub rows: Vec<Vec<String>>,
@@ -85,6 +86,7 @@ pub(crate) struct Picture {
 /// Shaded cells with names of rows and columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Matrix {
+    /// Empty where the heading above says it.
     pub caption: String,
     pub head: Vec<String>,
     /// Name and cells of each row; `None` is empty.
@@ -202,5 +204,27 @@ mod tests {
         ] {
             assert!(page.contains(part), "{part}: {page}");
         }
+    }
+
+    #[test]
+    fn a_table_without_a_caption_is_heard_with_its_heading() {
+        let table = || Block::table("", &[("name", Column::Text)], vec![]);
+        let rest = vec![
+            table(),
+            Block::Heading("H".into()),
+            table(),
+            Block::folded("F", vec![table()]),
+        ];
+        let document = Document {
+            title: "T".into(),
+            answer: vec![table()],
+            sections: vec![Section::new("s", "S", rest)],
+            ..Document::default()
+        };
+        let page = document.html();
+        let captions: Vec<&str> = (page.split("<caption class=\"heard\">").skip(1))
+            .map(|rest| rest.split('<').next().unwrap())
+            .collect();
+        assert_eq!(captions, ["T", "S", "H", "F"]);
     }
 }

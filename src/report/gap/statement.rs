@@ -193,12 +193,17 @@ fn lacking(units: &Units, diagnosis: &Diagnosis) -> String {
         },
         false,
     );
+    // "Most of it" says already that more remains.
+    let more = match names.known.is_empty() {
+        true => "",
+        false => "; more remains",
+    };
     let remains = match (is_partial, &cause.remains) {
         (false, _) => [String::new(), String::new()],
-        (true, None) => ["; more remains"; 2].map(String::from),
+        (true, None) => [more; 2].map(String::from),
         (true, Some(rest)) => [
             format!("; more remains at {}", units.in_words(&rest.place)),
-            "; more remains".into(),
+            more.into(),
         ],
     };
     let gap = gap(diagnosis);
