@@ -278,11 +278,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 153, items.collect()),
         Ratchet::new("error types", 13, errors),
-        Ratchet::new("lines of code", 49_900, lines),
+        Ratchet::new("lines of code", 50_000, lines),
         Ratchet::new("files", 480, files.collect()),
         Ratchet::new("hidden items", 3, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 450, constants(sources)),
+        Ratchet::new("named numeric constants", 452, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             7,
@@ -293,14 +293,14 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
             2,
             long_functions(sources, 100),
         ),
-        Ratchet::new("further types of one name", 50, repeated_types(sources)),
+        Ratchet::new("further types of one name", 46, repeated_types(sources)),
         Ratchet::new(
             "library messages with words of the command line",
             10,
             foreign_words(sources),
         ),
         Ratchet::new("folders with more than 18 files", 0, crowded(sources, 18)),
-        Ratchet::new("questions for equations", 8, questions(sources)),
+        Ratchet::new("questions for equations", 7, questions(sources)),
         Ratchet::new(
             "doc comments of odd first words",
             0,

@@ -8,7 +8,7 @@
 //!
 //! An unknown function beside a set leaves it a part of the explanation if it adds less than a third; otherwise the set imitates an unknown law,
 //! and its mass is that of the unknown. An unknown function alone is a listed effect in another form as far as it is no better than an effect
-//! of its own variable, at its place.
+//! of its own variable, at its place. What it explains more is something unknown beside the effect, if that is 15 % at most.
 
 use crate::diagnose::outcome::Probabilities;
 use crate::diagnose::thresholds::Thresholds;
@@ -169,6 +169,13 @@ impl Hypotheses {
             .collect()
     }
 
+    /// Returns whether a listed effect of a function's own variable explains nearly all that the function does: the function is that effect
+    /// and something unknown.
+    fn is_effect_and_rest(&self, function: &Function) -> bool {
+        let held = (self.singles()).filter(|set| function.holds.contains(&set.keys[0]));
+        self.has_equations && best(held) > (1.0 - Thresholds::OUTDONE) * function.log_z.max(0.0)
+    }
+
     /// Posterior probabilities.
     pub fn posterior(&self) -> Posterior {
         let [each, every] = self.shares();
@@ -193,7 +200,13 @@ impl Hypotheses {
         let mass = |log_weight: f64| (log_weight - whole).exp() * odds.gap();
         let mut sums = Sums::new(&self.sets, &alone, mass);
         for (function, log_weight) in self.functions.iter().zip(&unknown) {
-            sums.function(function, mass(*log_weight), &self.held_by(function));
+            let is_part = self.is_effect_and_rest(function);
+            sums.function(
+                function,
+                mass(*log_weight),
+                &self.held_by(function),
+                is_part,
+            );
         }
         for (set, function, log_weight) in &beside {
             let is_part = self.is_part(set, function);
@@ -280,15 +293,20 @@ impl Sums {
         }
     }
 
-    /// Adds a function alone: the effects that it holds have their share of it.
-    fn function(&mut self, function: &Function, mass: f64, held: &[(&str, f64)]) {
+    /// Adds a function alone: the effects that it holds have their share of it. The rest is something unknown, beside an effect where that
+    /// is a part of the function.
+    fn function(&mut self, function: &Function, mass: f64, held: &[(&str, f64)], is_part: bool) {
         self.place(&function.places, mass);
-        self.unknown += mass;
+        let mut rest = mass;
         for (key, share) in held {
             if let Some(i) = self.singles.get(*key) {
                 self.alone[*i] += mass * share;
-                self.unknown -= mass * share;
+                rest -= mass * share;
             }
+        }
+        match is_part {
+            true => self.beside.entry(1).or_default()[0] += rest,
+            false => self.unknown += rest,
         }
     }
 
