@@ -348,7 +348,7 @@ fn records_of_another_step_or_channels_are_refused_with_the_remedy() {
     };
     let error = other(Drive::autonomous(0.1, 300).unwrap(), 1);
     assert!(
-        error.contains("step is 0.1 s, the study's 0.05 s; give --step-of-record"),
+        error.contains("step is 0.1 s, the study's 0.05 s; resample the record"),
         "{error}"
     );
     let error = other(Drive::autonomous(0.05, 300).unwrap(), 2);

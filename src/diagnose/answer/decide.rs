@@ -43,12 +43,16 @@ impl Answer {
     pub fn decided(self) -> Self {
         let posterior = &self.posterior;
         let family = posterior.family();
-        let Some(first) = family.first() else {
+        let Some(&first) = family.first() else {
             return Self {
                 decision: Decision::NoneOfThese,
                 ..self
             };
         };
+        // An effect of the first set that is less probable than not is not accepted where another one is.
+        let is_said = |key: &&String| posterior.name(key) >= Thresholds::SAID;
+        let said: Vec<String> = first.keys.iter().filter(is_said).cloned().collect();
+        let first = (posterior.sets.iter().find(|set| set.keys == said)).unwrap_or(first);
         // A set that contains the first is no rival of it: it says that there may be more.
         let rivals = family.iter().filter(|set| !set.contains(first));
         let keys = (first.keys.iter()).chain(rivals.flat_map(|set| &set.keys));
