@@ -304,6 +304,7 @@ impl Sums {
                 rest -= mass * share;
             }
         }
+        let rest = rest.max(0.0);
         match is_part {
             true => self.beside.entry(1).or_default()[0] += rest,
             false => self.unknown += rest,
