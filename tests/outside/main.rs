@@ -41,6 +41,7 @@ fn main() {
         browser::a_broken_page_is_complained_of,
     ];
     let records = trials![are_records;
+        agreement::fits_and_diagnoses_of_rigs_weigh_effects_alike,
         golden::golden_answers_of_rigs_stay,
         fits::the_overflow_of_real_tanks_is_found_by_fits,
         fits::the_carriage_shows_its_friction,
@@ -51,8 +52,6 @@ fn main() {
         records::the_positioning_rig_lacks_dry_friction_and_an_offset,
         records::the_heater_lacks_a_lag,
     ];
-    // Some effects still differ by more than half a nat: `--ignored` shows the table.
-    let open = trials![false; agreement::fits_and_diagnoses_of_rigs_weigh_effects_alike];
-    let all = pages.into_iter().chain(records).chain(open).collect();
+    let all = pages.into_iter().chain(records).collect();
     libtest_mimic::run(&arguments, all).exit();
 }

@@ -16,7 +16,6 @@ fn reference(name: &str) -> Study {
 }
 
 #[test]
-#[ignore = "open: some effects still differ by more than half a nat"]
 fn a_fit_and_a_diagnosis_weigh_an_effect_alike() {
     let plan = RecordPlan::levels(4.0, 80, 0.5, 3.0, 20);
     let tanks = Study::new("tanks", truetwin::twins::CascadedTanks, plan).unwrap();
