@@ -5,7 +5,7 @@
 //! | residuals with a Jacobian | [`GaussNewton::minimise`] |
 //! | starts that are spread over a box | [`space_filling`] |
 //!
-//! What is minimised implements [`ResidualProblem`]; it says with [`MathError`] whether a failure costs one point (a twin that diverged) or
+//! A problem to minimise implements [`ResidualProblem`]; it says with [`MathError`] whether a failure costs one point (a twin that diverged) or
 //! everything. Nothing here prints or draws unseeded randomness.
 
 mod bounds;
