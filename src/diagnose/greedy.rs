@@ -4,7 +4,7 @@ use super::base::Base;
 use super::settings::{Ablation, DiagnoseSettings};
 use crate::effect::EffectPattern;
 use crate::fit::passes::Passes;
-use crate::hypothesis::search::{Breadth, listed};
+use crate::hypothesis::search::{Before, Breadth, listed};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use std::sync::Arc;
@@ -36,7 +36,7 @@ pub(crate) fn greedy(
     let breadth = Breadth::of(&model, settings.quick);
     let mut keys = vec![];
     while keys.len() < MOST {
-        let found = listed(&model, &terms, &[], breadth)?;
+        let found = listed(&model, &terms, Before::default(), breadth)?;
         let best = (found.into_iter().next()).filter(|best| best.log_z > model.log_evidence);
         let Some((key, better)) = best.and_then(|best| Some((best.last().key(), best.model?)))
         else {

@@ -6,7 +6,7 @@ use crate::fit::climb::{Fitted, climb, fit};
 use crate::fit::problem::Problem;
 use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::model::Model;
-use crate::hypothesis::search::{Breadth, listed};
+use crate::hypothesis::search::{Before, Breadth, listed};
 use crate::hypothesis::term::Term;
 use crate::study::StudyError;
 use crate::twin::Role;
@@ -86,7 +86,7 @@ pub(in crate::diagnose) fn absorbing(
     terms: &[Arc<Term>],
 ) -> Result<Vec<Explanation>, StudyError> {
     let breadth = Breadth::of(within, false).of_all();
-    let mut found = listed(within, terms, &[], breadth)?;
+    let mut found = listed(within, terms, Before::default(), breadth)?;
     let best = free.fitted.log_likelihood - Thresholds::ABSORBS;
     let is_as_good = |model: &Model| model.fitted.log_likelihood >= best;
     found.retain(|e| e.model.as_ref().is_some_and(is_as_good));

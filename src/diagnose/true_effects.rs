@@ -8,7 +8,7 @@ use super::step::finer_step;
 use super::thresholds::Thresholds;
 use crate::fit::passes::Passes;
 use crate::hypothesis::model::Model;
-use crate::hypothesis::search::{Breadth, listed};
+use crate::hypothesis::search::{Before, Breadth, listed};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use crate::twin::Twin;
@@ -89,7 +89,7 @@ fn fitted(
             least: f64::NEG_INFINITY,
             ..Breadth::of(&model, false).of_all().for_gap(f64::INFINITY)
         };
-        let found = listed(&model, &ways, &[], breadth)?;
+        let found = listed(&model, &ways, Before::default(), breadth)?;
         match found.into_iter().find_map(|e| e.model) {
             Some(with) => model = with,
             None => return Ok(None),

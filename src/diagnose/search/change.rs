@@ -1,4 +1,4 @@
-//! Changes that a search asks for: another kind of noise, a finer step, more rows.
+//! Changes that a search asks for: another step, another kind of noise, more rows.
 
 use super::Search;
 use super::evidence::{Change, Evidence, Purpose};
@@ -11,6 +11,10 @@ impl<E: Evidence> Search<E> {
     pub(super) fn asks_for(&mut self) -> Result<Option<Change>, StudyError> {
         if self.is_partial {
             return Ok(None);
+        }
+        // What is missing may have made a finer step look better beside the twin alone.
+        if !self.is_own_step_searched && self.is_gap() && !self.refused.contains(&Change::OwnStep) {
+            return Ok(Some(Change::OwnStep));
         }
         if let Some(noise) = self.asks_for_noise() {
             return Ok(Some(noise));

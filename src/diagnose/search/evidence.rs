@@ -93,6 +93,8 @@ impl Question {
 pub(in crate::diagnose) enum Change {
     /// Another kind of noise in the place of the twin's own.
     Noise(TermSet),
+    /// The twin's own step, where a search began with a finer one.
+    OwnStep,
     /// A finer step.
     Step {
         step: FinerStep,
@@ -111,6 +113,7 @@ impl Change {
         match self {
             Self::Noise(_) => 0.0,
             Self::Step { .. } => Thresholds::STEP_WINS,
+            Self::OwnStep => -Thresholds::STEP_WINS,
             // Of other records.
             Self::AllRows | Self::MoreRows => f64::NEG_INFINITY,
         }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! stages    unknown functions ▸ listed effects ▸ kinds of noise ▸ what effects leave ▸ pairs      again from the start if the twin fits better
-//! changes   another kind of noise | a finer step | all rows      kept where log Z of all hypotheses together rises
+//! changes   the twin's own step | another kind of noise | a finer step | all rows      kept where log Z of all hypotheses together rises
 //! rest      what the best sets leave, once the twin stays as it is
 //! ```
 //!
@@ -56,6 +56,8 @@ pub(in crate::diagnose) struct Search<E> {
     begin: Begin,
     asked: BTreeSet<(Purpose, TermSet)>,
     refused: Vec<Change>,
+    /// False where the twin was given a finer step before anything was searched with its own.
+    is_own_step_searched: bool,
     /// log Z of the explanations from which the twin was fitted again last, to no avail.
     tried: Vec<f64>,
     budget: Budget,
@@ -112,6 +114,7 @@ impl<E: Evidence> Search<E> {
     fn new(evidence: E, budget: Budget, watch: Watch<'_>) -> Self {
         Self {
             known: Explanations::new(evidence.twin()),
+            is_own_step_searched: evidence.has_own_step(),
             evidence,
             is_partial: false,
             begin: Begin::Afresh,
@@ -228,6 +231,9 @@ impl<E: Evidence> Search<E> {
             return Ok(None);
         };
         let mut next = Self::new(evidence, self.budget.clone(), watch);
+        if *change != Change::MoreRows {
+            next.is_own_step_searched |= self.is_own_step_searched;
+        }
         if change.carries() {
             next.known = self.carried(&next.evidence)?;
             next.begin = Begin::Carried;

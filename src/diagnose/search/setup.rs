@@ -14,13 +14,14 @@ use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::model::Model;
 use crate::hypothesis::noise::kinds;
 use crate::hypothesis::scales::Scales;
-use crate::hypothesis::search::{Breadth, listed, unknown as functions};
+use crate::hypothesis::search::{Before, Breadth, listed, unknown as functions};
 use crate::hypothesis::shared;
 use crate::hypothesis::term::Term;
 use crate::hypothesis::unknown::unknown;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// A study, all its records, and the settings of a search.
@@ -106,9 +107,14 @@ impl<'s> Task<'s> {
             .collect()
     }
 
+    /// The twin of the study with its own step, fitted.
+    fn own(&self, records: Arc<[Record]>) -> Result<Base, StudyError> {
+        let twin = self.study.twin();
+        Base::new(self.study, twin, records, self.settings, &self.passes)
+    }
+
     fn fitted(&self, records: Arc<[Record]>) -> Result<Setup<'s>, StudyError> {
-        let own = self.study.twin();
-        let base = Base::new(self.study, own, records, self.settings, &self.passes)?;
+        let base = self.own(records)?;
         match self.step_at_once(&base)? {
             Some(step) => self.with_step(&base, step, &[]),
             None => self.with_base(base),
@@ -127,7 +133,7 @@ impl<'s> Task<'s> {
             listed: self.budget.starts,
             ..Breadth::of(model, self.settings.quick)
         };
-        let effects = listed(model, &terms, &[], breadth)?;
+        let effects = listed(model, &terms, Before::default(), breadth)?;
         let price = (effects.len() as f64 / Thresholds::LISTED).ln();
         let best = (effects.first()).filter(|e| e.log_z - model.log_evidence - price > gain);
         match best.and_then(|effect| effect.model.as_ref()) {
@@ -208,7 +214,12 @@ impl<'s> Setup<'s> {
             Purpose::Functions => functions(inside, terms, breadth.few())?,
             Purpose::Effects | Purpose::AllEffects => {
                 let afresh = false;
-                listed(inside, terms, &[], Breadth { afresh, ..breadth })?
+                listed(
+                    inside,
+                    terms,
+                    Before::default(),
+                    Breadth { afresh, ..breadth },
+                )?
             }
             _ => vec![],
         };
@@ -261,13 +272,10 @@ impl Evidence for Setup<'_> {
             Family::Listed => chosen(self.listed.clone(), question),
             Family::Noise => chosen(self.noise.clone(), question),
         };
-        let thetas: Vec<Vec<f64>> = (question.from.iter())
-            .filter_map(|set| known.get(set)?.own_theta())
-            .collect();
         let mut found = match family {
             Family::Unknown => functions(model, &terms, breadth)?,
-            Family::Listed => listed(model, &terms, &thetas, breadth)?,
-            Family::Noise => listed(model, &terms, &[], breadth)?,
+            Family::Listed => listed(model, &terms, before(question, &terms, known), breadth)?,
+            Family::Noise => listed(model, &terms, Before::default(), breadth)?,
         };
         if matches!(
             question.purpose,
@@ -296,6 +304,7 @@ impl Evidence for Setup<'_> {
                 let thetas: Vec<Vec<f64>> = best.iter().filter_map(|e| e.own_theta()).collect();
                 return self.task.with_step(&self.base, *step, &thetas).map(Some);
             }
+            Change::OwnStep => Some(self.task.own(self.base.model.problem.records.clone())?),
             Change::Noise(set) => match known.model(set) {
                 Some(model) => self.base.with_noise(model)?,
                 None => None,
@@ -354,6 +363,22 @@ impl Evidence for Setup<'_> {
 
     fn has_own_noise(&self) -> bool {
         self.base.noises.is_empty()
+    }
+}
+
+/// What is known that bears on a question: θ of the sets that it names, and fits of its own terms.
+fn before(question: &Question, terms: &[Arc<Term>], known: &Explanations) -> Before {
+    let keys: BTreeSet<String> = terms.iter().map(|term| term.key()).collect();
+    let fit = |key: String| {
+        let own = question.beside.iter().map(str::to_owned);
+        let found = known.get(&own.chain([key.clone()]).collect())?;
+        (found.last().key() == key).then(|| found.model.clone())?
+    };
+    Before {
+        thetas: (question.from.iter())
+            .filter_map(|set| known.get(set)?.own_theta())
+            .collect(),
+        fits: keys.into_iter().filter_map(fit).collect(),
     }
 }
 

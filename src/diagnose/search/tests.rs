@@ -25,9 +25,12 @@ struct Table {
     /// log Z over the twin's of sets, written "e1 e2".
     nats: BTreeMap<&'static str, f64>,
     rows: (usize, usize),
-    /// The table with another kind of noise, or with a finer step.
+    /// The table with another kind of noise, with a finer step, or with the twin's own instead of a finer one.
     changed: Option<Box<Table>>,
+    /// The finer step that is asked for.
     step: Option<FinerStep>,
+    /// `true` where the search begins with a finer step.
+    is_finer: bool,
     asked: Arc<Mutex<Vec<Asked>>>,
 }
 
@@ -143,7 +146,9 @@ impl Evidence for Table {
     fn changed(&self, change: &Change, _: &Explanations) -> Result<Option<Self>, StudyError> {
         let (seen, all) = self.rows;
         Ok(match change {
-            Change::Noise(_) | Change::Step { .. } => self.changed.as_deref().cloned(),
+            Change::Noise(_) | Change::Step { .. } | Change::OwnStep => {
+                self.changed.as_deref().cloned()
+            }
             Change::AllRows => Some(Self {
                 rows: (all, all),
                 ..self.clone()
@@ -187,7 +192,7 @@ impl Evidence for Table {
     }
 
     fn has_own_step(&self) -> bool {
-        self.step.is_some()
+        !self.is_finer
     }
 
     fn has_own_noise(&self) -> bool {
@@ -264,6 +269,29 @@ fn a_change_that_makes_it_worse_is_dropped() {
     assert_eq!(worse.known.twin().log_z, 0.0);
     assert_eq!(worse.refused.len(), 1);
     assert_eq!(worse.known.suffices(worse.known.listed()[0]), Some(true));
+}
+
+/// A twin that was given a finer step at once is searched with its own step as well where something is missing, and keeps that unless the
+/// finer one is clearly likelier.
+#[test]
+fn a_gap_that_passed_for_a_step_is_searched_with_the_own_step() {
+    let with = |nats: f64, own: f64| {
+        let own = Table {
+            twin: own,
+            ..Table::new(&[("e1", 60.0), ("f1", 30.0)])
+        };
+        let table = Table {
+            is_finer: true,
+            changed: Some(Box::new(own)),
+            ..Table::new(&[("e1", nats), ("f1", 0.5 * nats)])
+        };
+        table.found()
+    };
+    assert!(!with(40.0, 1.0).evidence.is_finer);
+    assert!(!with(60.0, -1.0).evidence.is_finer);
+    let (lower, complete) = (with(60.0, -3.0), with(-1.0, 0.0));
+    assert!(lower.evidence.is_finer && complete.evidence.is_finer);
+    assert_eq!((lower.refused.len(), complete.refused.len()), (1, 0));
 }
 
 #[test]

@@ -28,7 +28,9 @@ pub(super) fn unpack(from: impl Read + Seek, folder: &Path, most: u64) -> Result
         let mut entry = archive.by_index(index).map_err(|error| error.to_string())?;
         let name = excerpt(entry.name());
         let failed = |error: io::Error| format!("{name}: {error}");
-        let Some(path) = entry.enclosed_name() else {
+        // The library takes the root off an absolute name.
+        let absolute = entry.name().starts_with(['/', '\\']);
+        let Some(path) = entry.enclosed_name().filter(|_| !absolute) else {
             return Err(format!("its entry {name} leads out of the archive"));
         };
         if entry.is_symlink() {

@@ -2,7 +2,7 @@
 
 use super::frequencies::frequencies;
 use super::model::Model;
-use super::{Breadth, listed};
+use super::{Before, Breadth, listed};
 use crate::effect::Effect;
 use crate::fit::axis::Axis;
 use crate::fit::problem::Problem;
@@ -133,7 +133,7 @@ fn grown(
     let breadth = Breadth::of(&model, false).thorough();
     let mut others = vec![];
     while !terms.is_empty() {
-        let found = listed(&model, &terms, &[], breadth)?;
+        let found = listed(&model, &terms, Before::default(), breadth)?;
         let mut fitted =
             (found.into_iter()).filter_map(|found| Some((found.last().clone(), found.model?)));
         let Some((term, better)) = fitted.next() else {

@@ -71,11 +71,20 @@ fn ways(terms: &[Arc<Term>]) -> BTreeMap<String, usize> {
     ways
 }
 
-/// Listed effects beside a model, refitted; best first. `thetas` are further starts of the twin's own θ.
+/// Knowledge with which a search for listed effects begins.
+#[derive(Default)]
+pub(crate) struct Before {
+    /// Further starts of the twin's own θ.
+    pub thetas: Vec<Vec<f64>>,
+    /// Fits of the same effects beside another fit of the same model: they go on from where they are.
+    pub fits: Vec<Model>,
+}
+
+/// Listed effects beside a model, refitted; best first.
 pub(crate) fn listed(
     model: &Model,
     terms: &[Arc<Term>],
-    thetas: &[Vec<f64>],
+    before: Before,
     breadth: Breadth,
 ) -> Result<Vec<Explanation>, FilterError> {
     if terms.is_empty() {
@@ -83,7 +92,8 @@ pub(crate) fn listed(
     }
     let promises = scan(model, terms)?;
     let found = |models: Vec<Model>| models.into_iter().map(Explanation::of);
-    let mut all: Vec<Explanation> = found(first_fits(model, &promises, thetas, breadth)?).collect();
+    let first = first_fits(model, &promises, &before.thetas, breadth)?;
+    let mut all: Vec<Explanation> = found(first).collect();
     let mut others = match breadth.afresh {
         true => fresh_fits(model, &promises)?,
         false => vec![],
@@ -93,12 +103,23 @@ pub(crate) fn listed(
     {
         others.extend(annealed_fits(model, &loud, terms, breadth)?);
     }
+    let known: Vec<Explanation> = found(before.fits).collect();
+    let is_known = |term: &Term| known.iter().any(|e| e.last().key() == term.key());
+    let unfitted: Vec<&Promise> = (promises.iter())
+        .filter(|promise| !is_known(&promise.term))
+        .collect();
     for other in found(others) {
         let is_same = |own: &&mut Explanation| Arc::ptr_eq(own.last(), other.last());
         match all.iter_mut().find(is_same) {
             Some(own) if own.log_z >= other.log_z => {}
             Some(own) => *own = other,
             None => all.push(other),
+        }
+    }
+    for old in known {
+        let is_beaten = |new: &Explanation| new.set() == old.set() && new.log_z >= old.log_z;
+        if !all.iter().any(is_beaten) {
+            all.push(old);
         }
     }
     sort(&mut all);
@@ -115,7 +136,7 @@ pub(crate) fn listed(
         }
     }
     // What was not refitted is no better than its promise.
-    for promise in &promises {
+    for promise in unfitted {
         if !all.iter().any(|f| Arc::ptr_eq(f.last(), &promise.term)) {
             all.push(Explanation {
                 terms: (model.terms.iter().chain([&promise.term]))
