@@ -28,7 +28,7 @@ impl FitSettings {
 impl Default for FitSettings {
     fn default() -> Self {
         Self {
-            seed: 0,
+            seed: 1,
             level: 0.9,
             draws: 0,
         }

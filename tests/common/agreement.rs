@@ -101,8 +101,15 @@ pub(crate) fn compared(study: &Study, record: &Record, without: &[&str]) -> Vec<
         .collect()
 }
 
-/// The largest difference among effects that a diagnosis fits: what promises less than nothing it does not.
+/// Nats from the best effect within which another may still be what is missing, and is fitted to its end.
+const CANDIDATES: f64 = 6.0;
+/// Nats that a diagnosis credits a fit with that it gave up before its end.
+const CREDIT: f64 = 1.5;
+
+/// Effects that may be what is missing and of which both do not say the same, and others of which a diagnosis says more than its credit
+/// allows.
 pub(crate) fn differing(name: &str, all: &[Compared]) -> Vec<String> {
+    let best = all.iter().map(|c| c.diagnosed).fold(0.0, f64::max);
     for c in all {
         let Compared {
             key,
@@ -115,7 +122,13 @@ pub(crate) fn differing(name: &str, all: &[Compared]) -> Vec<String> {
         );
     }
     (all.iter())
-        .filter(|c| c.diagnosed > 1.0 && (c.fitted - c.diagnosed).abs() > 0.5)
+        .filter(|c| {
+            let is_near = c.diagnosed > (best - CANDIDATES).max(1.0);
+            let least = if is_near { -0.5 } else { -0.5 - CREDIT };
+            let most = if is_near { 0.5 } else { f64::INFINITY };
+            let difference = c.fitted - c.diagnosed;
+            c.diagnosed > 1.0 && !(least..=most).contains(&difference)
+        })
         .map(|c| format!("{name} {}: {:.2} and {:.2}", c.key, c.diagnosed, c.fitted))
         .collect()
 }

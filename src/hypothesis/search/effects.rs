@@ -143,10 +143,11 @@ fn grown(
         terms.retain(|other| !Arc::ptr_eq(other, &term));
         model = better;
         if !terms.is_empty() {
-            // As thorough as if these effects were all: with one effect more no fit is worse.
+            // As thorough as if these effects were all, and a start of what follows: with one effect more no fit is worse.
             let fits = fits(&model.problem, &[model.fitted.theta.clone()], noise)?;
             let best = fits.into_iter().next();
             model = (best.and_then(|best| model.refitted(best))).unwrap_or(model);
+            others.push(model.fitted.theta.clone());
         }
     }
     others.insert(0, model.fitted.theta);

@@ -209,7 +209,7 @@ fn annealed_fits(
 fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Result<(), FilterError> {
     let floor = model.log_evidence;
     let top = all.first().map_or(floor, |f| f.log_z);
-    let is_near = |i: usize, log_z: f64| i < 5 || log_z > top - 4.0;
+    let is_near = |i: usize, log_z: f64| i < 5 || log_z > top - CANDIDATES;
     let is_worth = |i: usize, log_z: f64| i < 2 || log_z > floor + 1.0;
     let best: Vec<Vec<f64>> = all
         .iter()
