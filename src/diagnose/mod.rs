@@ -26,6 +26,7 @@ pub(crate) mod fixture;
 mod greedy;
 mod locate;
 mod outcome;
+mod price;
 mod prior;
 mod quantify;
 mod report;

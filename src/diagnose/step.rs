@@ -3,7 +3,7 @@
 use super::thresholds::Thresholds;
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
-use crate::hypothesis::model::Model;
+use crate::hypothesis::search::model::Model;
 use crate::likelihood::kalman::recoverable;
 use crate::study::StudyError;
 use crate::twin::{Integrator, MOST_SUBSTEPS, Twin};

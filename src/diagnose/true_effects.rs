@@ -7,7 +7,7 @@ use super::settings::DiagnoseSettings;
 use super::step::finer_step;
 use super::thresholds::Thresholds;
 use crate::fit::passes::Passes;
-use crate::hypothesis::model::Model;
+use crate::hypothesis::search::model::Model;
 use crate::hypothesis::search::{Before, Breadth, listed};
 use crate::record::Record;
 use crate::study::{Study, StudyError};

@@ -31,7 +31,6 @@ use self::term::Term;
 use std::sync::Arc;
 
 pub(crate) use alike::merged;
-pub(crate) use search::{effects, explanation, frequencies, model};
 
 /// Terms that several models hold.
 pub(crate) fn shared(terms: Vec<Term>) -> Vec<Arc<Term>> {

@@ -3,7 +3,7 @@
 use super::{Study, StudyError};
 use crate::effect::Effect;
 use crate::fit::{Fit, FitScore, FitSettings, Subject, run, score};
-use crate::hypothesis::effects::searched;
+use crate::hypothesis::search::effects::searched;
 use crate::likelihood::{Beliefs, measured};
 use crate::progress::Progress;
 use crate::record::Record;

@@ -4,7 +4,7 @@ use super::posterior::{Function, Hypotheses, Places, Posterior, Set, log_sum};
 use crate::diagnose::search::Explanations;
 use crate::effect::TargetKind;
 use crate::fit::evidence::log_mean;
-use crate::hypothesis::explanation::Explanation;
+use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::term::{Nature, Part, Term};
 use std::sync::Arc;
 

@@ -11,6 +11,7 @@
 //! of its own variable, at its place. What it explains more is something unknown beside the effect, if that is 15 % at most.
 
 use crate::diagnose::outcome::Probabilities;
+use crate::diagnose::price::Price;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
 use std::collections::BTreeMap;
@@ -120,16 +121,8 @@ impl Posterior {
 }
 
 impl Hypotheses {
-    /// Nats that so many effects together cost: their prior, and the fine print of the first law.
-    fn price(&self, count: usize) -> f64 {
-        let singles = self.singles().count() as f64;
-        let second = Thresholds::SECOND * Thresholds::LISTED / (0.5 * (singles - 1.0)).max(1.0);
-        (self.fine_print() - second.ln()) * (count - 1) as f64
-    }
-
-    /// Nats that a second law has to add beside its prior: integrators and discretisation differ by as much.
-    fn fine_print(&self) -> f64 {
-        Thresholds::FINE_PRINT * best(self.singles()).max(0.0)
+    fn price(&self) -> Price {
+        Price::new(self.singles().count(), best(self.singles()))
     }
 
     fn singles(&self) -> impl Iterator<Item = &Set> {
@@ -146,7 +139,7 @@ impl Hypotheses {
     /// Returns whether a set is a part of the explanation beside a function: it explains two thirds of what both do, and as much as
     /// functions alone nearly do, or as no other effect does.
     fn is_part(&self, set: &Set, function: &Function) -> bool {
-        let own = set.log_z - self.price(set.keys.len());
+        let own = set.log_z - self.price().of(set.keys.len());
         let added = function.log_z - set.log_z;
         let best_function = best_of(self.functions.iter().map(|f| f.log_z));
         let others = self.singles().filter(|s| !set.keys.contains(&s.keys[0]));
@@ -156,61 +149,55 @@ impl Hypotheses {
             && (own > (1.0 - Thresholds::OUTDONE) * best_function || stands_alone)
     }
 
-    /// The effects that a function holds in another form, with the share of its mass that is theirs.
-    fn held_by<'s>(&'s self, function: &'s Function) -> Vec<(&'s str, f64)> {
+    /// The effects that a function holds in another form, with the share of its mass that is theirs; and whether they explain nearly all that
+    /// it does, so that the rest of it is something unknown beside them.
+    fn held_by<'s>(&'s self, function: &'s Function) -> (Vec<(&'s str, f64)>, bool) {
         let held: Vec<&Set> = (self.singles())
             .filter(|set| function.holds.contains(&set.keys[0]))
             .collect();
         let top = best(held.iter().copied());
         let credit = (top - function.log_z).min(0.0).exp();
         let sum: f64 = held.iter().map(|set| (set.log_z - top).exp()).sum();
-        (held.into_iter())
+        let leaves_rest =
+            self.has_equations && top > (1.0 - Thresholds::OUTDONE) * function.log_z.max(0.0);
+        let shares = (held.into_iter())
             .map(|set| (set.keys[0].as_str(), credit * (set.log_z - top).exp() / sum))
-            .collect()
-    }
-
-    /// Returns whether a listed effect of a function's own variable explains nearly all that the function does: the function is that effect
-    /// and something unknown.
-    fn is_effect_and_rest(&self, function: &Function) -> bool {
-        let held = (self.singles()).filter(|set| function.holds.contains(&set.keys[0]));
-        self.has_equations && best(held) > (1.0 - Thresholds::OUTDONE) * function.log_z.max(0.0)
+            .collect();
+        (shares, leaves_rest)
     }
 
     /// Posterior probabilities.
     pub fn posterior(&self) -> Posterior {
-        let [each, every] = self.shares();
+        let ([each, every], price) = (self.shares(), self.price());
         let alone: Vec<f64> = (self.sets.iter())
-            .map(|set| each + set.log_z - self.price(set.keys.len()))
+            .map(|set| each + set.log_z - price.of(set.keys.len()))
             .collect();
         let unknown: Vec<f64> = self.functions.iter().map(|f| every + f.log_z).collect();
         let mut beside = vec![];
         for set in &self.sets {
-            let second = Thresholds::SECOND.ln() + each + every - self.price(set.keys.len());
+            let second = Thresholds::SECOND.ln() + each + every - price.of(set.keys.len());
             for function in set.beside.iter().flatten() {
                 beside.push((set, function, second + function.log_z));
             }
         }
-        let sum = |price: f64| {
-            let beside = beside.iter().map(|(.., log_weight)| log_weight - price);
+        let sum = |fine_print: f64| {
+            let beside = beside
+                .iter()
+                .map(|(.., log_weight)| log_weight - fine_print);
             log_sum(alone.iter().chain(&unknown).copied().chain(beside))
         };
         let odds = Odds::new(sum(0.0), self.nothing);
         // Which one: a second law pays the fine print of the first.
-        let whole = sum(self.fine_print());
+        let whole = sum(price.fine_print);
         let mass = |log_weight: f64| (log_weight - whole).exp() * odds.gap();
         let mut sums = Sums::new(&self.sets, &alone, mass);
         for (function, log_weight) in self.functions.iter().zip(&unknown) {
-            let is_part = self.is_effect_and_rest(function);
-            sums.function(
-                function,
-                mass(*log_weight),
-                &self.held_by(function),
-                is_part,
-            );
+            let (held, leaves_rest) = self.held_by(function);
+            sums.function(function, mass(*log_weight), &held, leaves_rest);
         }
         for (set, function, log_weight) in &beside {
             let is_part = self.is_part(set, function);
-            sums.beside(set, function, mass(log_weight - self.fine_print()), is_part);
+            sums.beside(set, function, mass(log_weight - price.fine_print), is_part);
         }
         let masses = sums.divided(&self.sets, &alone, self.needs_second());
         sums.posterior(masses, odds, &self.aliases)
@@ -226,8 +213,7 @@ impl Hypotheses {
         };
         match (best(1), best(2)) {
             (Some(one), Some(two)) => {
-                let prior = self.price(2) - self.fine_print();
-                two - prior > (1.0 - Thresholds::FINE_PRINT) * one
+                two - self.price().prior > (1.0 - Thresholds::FINE_PRINT) * one
             }
             (one, two) => one.is_none() && two.is_some(),
         }
@@ -294,8 +280,14 @@ impl Sums {
     }
 
     /// Adds a function alone: the effects that it holds have their share of it. The rest is something unknown, beside an effect where that
-    /// is a part of the function.
-    fn function(&mut self, function: &Function, mass: f64, held: &[(&str, f64)], is_part: bool) {
+    /// leaves it.
+    fn function(
+        &mut self,
+        function: &Function,
+        mass: f64,
+        held: &[(&str, f64)],
+        leaves_rest: bool,
+    ) {
         self.place(&function.places, mass);
         let mut rest = mass;
         for (key, share) in held {
@@ -305,7 +297,7 @@ impl Sums {
             }
         }
         let rest = rest.max(0.0);
-        match is_part {
+        match leaves_rest {
             true => self.beside.entry(1).or_default()[0] += rest,
             false => self.unknown += rest,
         }

@@ -2,8 +2,8 @@
 
 use crate::diagnose::outcome::MissingFunction;
 use crate::hypothesis::basis::basis;
-use crate::hypothesis::explanation::Explanation;
-use crate::hypothesis::model::Model;
+use crate::hypothesis::search::explanation::Explanation;
+use crate::hypothesis::search::model::Model;
 use crate::hypothesis::term::Nature;
 use nalgebra::{DMatrix, DVector};
 

@@ -4,7 +4,7 @@ use crate::diagnose::outcome::{Band, Cell, Channel, Lag, Maps, Region, Window};
 use crate::diagnose::residuals::cut::{Bins, Cut, Past};
 use crate::diagnose::residuals::excess::excess;
 use crate::diagnose::residuals::shares::shares;
-use crate::hypothesis::model::Model;
+use crate::hypothesis::search::model::Model;
 use crate::study::StudyError;
 
 /// Describes the innovations of a model. `best` divides the shares by where it helps.

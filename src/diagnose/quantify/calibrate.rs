@@ -1,6 +1,6 @@
 //! Calibration: evidence for a gap in records that the fitted twin itself has made.
 
-use crate::hypothesis::model::Model;
+use crate::hypothesis::search::model::Model;
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::study::StudyError;

@@ -13,7 +13,7 @@ use crate::fit::climb::climb;
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
-use crate::hypothesis::model::{Model, keys};
+use crate::hypothesis::search::model::{Model, keys};
 use crate::likelihood::kalman::recoverable;
 use crate::record::{Drive, Record, Signal};
 use crate::study::StudyError;

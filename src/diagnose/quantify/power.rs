@@ -13,7 +13,7 @@ use crate::diagnose::outcome::Visible;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::axis::SMALL;
 use crate::fit::reference::Reference;
-use crate::hypothesis::model::Model;
+use crate::hypothesis::search::model::Model;
 use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::kalman::recoverable;
 use crate::study::StudyError;

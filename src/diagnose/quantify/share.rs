@@ -7,7 +7,7 @@ use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::posterior::posterior;
 use crate::fit::problem::Problem;
-use crate::hypothesis::model::{Model, keys};
+use crate::hypothesis::search::model::{Model, keys};
 use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::study::StudyError;

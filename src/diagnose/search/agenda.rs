@@ -4,7 +4,7 @@ use super::Search;
 use super::evidence::{Evidence, Purpose, Question};
 use super::explanations::are_outliers_elsewhere;
 use crate::diagnose::thresholds::Thresholds;
-use crate::hypothesis::explanation::Explanation;
+use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::search::{Breadth, FEW};
 use crate::hypothesis::set::TermSet;
 

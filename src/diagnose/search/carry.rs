@@ -3,7 +3,7 @@
 use super::Search;
 use super::evidence::Evidence;
 use super::explanations::Explanations;
-use crate::hypothesis::explanation::Explanation;
+use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::set::TermSet;
 use crate::study::StudyError;
 use rayon::prelude::*;

@@ -3,8 +3,8 @@
 use super::explanations::Explanations;
 use crate::diagnose::step::FinerStep;
 use crate::diagnose::thresholds::Thresholds;
-use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::search::Breadth;
+use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::set::TermSet;
 use crate::study::StudyError;
 

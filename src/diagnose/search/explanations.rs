@@ -4,9 +4,10 @@
 //! r(E) = max_U log Z(E + U) − log Z(E)     E leaves nothing to explain if r < 4
 //! ```
 
+use crate::diagnose::price::Price;
 use crate::diagnose::thresholds::Thresholds;
-use crate::hypothesis::explanation::Explanation;
-use crate::hypothesis::model::Model;
+use crate::hypothesis::search::explanation::Explanation;
+use crate::hypothesis::search::model::Model;
 use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::{Nature, Part, Term};
 use std::collections::{BTreeMap, BTreeSet};
@@ -212,7 +213,7 @@ impl Explanations {
 
     /// Returns whether a pair explains more than any single effect, its price paid.
     pub fn wins(&self, pair: &Explanation) -> bool {
-        self.gain(pair) - self.price(2) > self.top()
+        self.gain(pair) - self.price().of(2) > self.top()
     }
 
     /// The best pair, if it explains more than any single effect.
@@ -229,12 +230,9 @@ impl Explanations {
         singles
     }
 
-    /// Nats that so many effects together cost: their prior, and the fine print of the first law.
-    pub fn price(&self, count: usize) -> f64 {
-        let pairs = 0.5 * (self.listed().len() as f64 - 1.0);
-        let second = Thresholds::SECOND * Thresholds::LISTED / pairs.max(1.0);
-        let fine_print = Thresholds::FINE_PRINT * self.top().max(0.0);
-        (fine_print - second.ln()) * (count - 1) as f64
+    /// Nats that a second effect costs.
+    pub fn price(&self) -> Price {
+        Price::new(self.listed().len(), self.top())
     }
 
     /// Listed effects that may be what is missing: the best pair where it explains more than any single one, then all single ones near the
@@ -270,7 +268,7 @@ impl Explanations {
         let pair = self.winning_pair()?;
         let all = (self.singles_of(pair).into_iter()).flat_map(|single| self.noise_beside(single));
         let best = all.max_by(|a, b| a.log_z.total_cmp(&b.log_z))?;
-        (best.log_z > pair.log_z - self.price(2)).then_some(best)
+        (best.log_z > pair.log_z - self.price().of(2)).then_some(best)
     }
 }
 

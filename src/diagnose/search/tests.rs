@@ -4,8 +4,8 @@ use super::evidence::{Family, Question};
 use super::*;
 use crate::diagnose::step::FinerStep;
 use crate::effect::Catalogue;
-use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::search::Breadth;
+use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::term::{Nature, Part, Term, fixture};
 use crate::progress::Listener;
 use crate::twin::Integrator;
@@ -373,9 +373,9 @@ fn a_second_effect_has_the_prior_of_something_else() {
         });
     }
     let pairs = 0.5 * (n * (n - 1)) as f64;
-    let share = pairs * (-known.price(2)).exp() / n as f64;
+    let share = pairs * (-known.price().of(2)).exp() / n as f64;
     assert!((share - Thresholds::SECOND * Thresholds::LISTED).abs() < 1e-12);
-    assert_eq!(known.price(1), 0.0);
+    assert_eq!(known.price().of(1), 0.0);
 }
 
 /// A second effect has to add its prior, and a little of what the first one explains; what may imitate the step's error is asked about it,
