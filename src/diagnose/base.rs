@@ -6,11 +6,10 @@ use super::step::FinerStep;
 use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::climb::{climb, fit};
+use crate::fit::fits;
 use crate::fit::growing::base_fit;
 use crate::fit::passes::Passes;
 use crate::fit::problem::Problem;
-use crate::fit::spectral_starts;
-use crate::fit::starts::{Care, search};
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::search::frequencies::frequencies;
@@ -72,12 +71,8 @@ impl Base {
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
-            let mut initial: Vec<Vec<f64>> =
-                initial.iter().map(|theta| problem.full(theta)).collect();
-            initial.extend(spectral_starts(&problem));
-            // The twin is fitted again beside each explanation. With more starts 60 open trials were decided alike, and the record of the
-            // quick start asked for a finer step than it has.
-            let found = search(&problem, &initial, starts, ITERATIONS, Care::Loud)?;
+            let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
+            let found = fits(&problem, &initial, starts)?;
             found.into_iter().next().map(|fitted| (problem, fitted))
         } else {
             let problem = Problem::of_twin(twin, records).counted_with(passes);

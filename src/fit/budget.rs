@@ -21,6 +21,11 @@ pub(super) struct FitBudget {
     pub same_top: f64,
     /// Times that other starts are tried while only one search ends at the best top.
     pub more_starts: u64,
+    /// Simplex searches one after another where a climb ends at a kink, at most; their steps for each entry, and the standard deviation of the
+    /// simplex's values in nats at which one ends.
+    pub kink_rounds: usize,
+    pub simplex_steps: u64,
+    pub simplex_end: f64,
     /// Distance from the top that counts as arrived, in standard deviations: what is left to gain is its square's half, 0.02 nats.
     pub arrived: f64,
     /// The same where three searches, or most of them, end at one top: dry friction and thresholds make kinks, and at a kink no gradient vanishes.
@@ -94,6 +99,9 @@ pub(super) const BUDGET: FitBudget = FitBudget {
     starts_apart: 1.0,
     same_top: 0.1,
     more_starts: 3,
+    kink_rounds: 4,
+    simplex_steps: 40,
+    simplex_end: 0.02,
     arrived: 0.2,
     agreed: 1.0,
     restarts: 3,

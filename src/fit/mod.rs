@@ -10,7 +10,7 @@
 //! | `budget.rs` | cost and tolerances of a fit |
 //! | `starts.rs`, `spectral.rs`, `growing.rs` | where does a search begin |
 //! | `solver.rs` | the one solver, on argmin |
-//! | `climb.rs` | the most probable θ |
+//! | `climb.rs`, `kinks.rs` | the most probable θ, also where the likelihood has kinks |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `passes.rs` | what a search costs |
 //! | `evidence.rs` | the likelihood averaged over the prior |
@@ -27,6 +27,7 @@ pub(crate) mod doubts;
 pub(crate) mod evidence;
 pub(crate) mod follow;
 pub(crate) mod growing;
+mod kinks;
 pub(crate) mod least_squares;
 mod outcome;
 pub(crate) mod passes;

@@ -2,6 +2,7 @@
 
 use super::climb::Fitted;
 use super::growing::base_fit;
+use super::kinks::over_kinks;
 use super::problem::Problem;
 use super::spectral::spectral_starts;
 use super::starts::{Care, polish, search};
@@ -43,7 +44,11 @@ pub(crate) fn fits(
 ) -> Result<Vec<Fitted>, FilterError> {
     if !problem.is_simulated() {
         let initial = [initial, &spectral_starts(problem)].concat();
-        return search(problem, &initial, noise, ITERATIONS, Care::Thorough);
+        let mut fits = search(problem, &initial, noise, ITERATIONS, Care::Thorough)?;
+        if let Some(best) = fits.first_mut() {
+            *best = over_kinks(problem, best.clone())?;
+        }
+        return Ok(fits);
     }
     let theta = initial.first().map(Vec::as_slice);
     let fit = base_fit(problem, theta, noise)?;

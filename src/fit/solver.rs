@@ -321,7 +321,7 @@ fn lost() -> MathError {
 }
 
 /// The error of an evaluation, given back by argmin.
-fn evaluation_error<E>(error: argmin::core::Error) -> E
+pub(super) fn evaluation_error<E>(error: argmin::core::Error) -> E
 where
     E: std::error::Error + From<MathError> + Send + Sync + 'static,
 {

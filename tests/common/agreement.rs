@@ -10,6 +10,8 @@ pub(crate) struct Compared {
     pub key: String,
     pub diagnosed: f64,
     pub fitted: f64,
+    /// `true` where the effect may be what is missing, so that a diagnosis fits it to its end.
+    pub is_candidate: bool,
 }
 
 /// A simulated record of a twin with an effect.
@@ -81,6 +83,8 @@ pub(crate) fn compared(study: &Study, record: &Record, without: &[&str]) -> Vec<
     }
     let alone = log_evidence(study, "", record);
     let accepted = &found.cause.accepted;
+    let best = (found.cause.effects.iter()).map(|e| e.log_evidence);
+    let best = best.fold(0.0, f64::max);
     (found.cause.effects.iter())
         .filter(|e| e.id != "sensor-quantization" && e.id != "sensor-saturation")
         .filter(|e| accepted.len() < 2 || !accepted.contains(&e.key()))
@@ -89,19 +93,20 @@ pub(crate) fn compared(study: &Study, record: &Record, without: &[&str]) -> Vec<
             let all: Vec<String> = (same.filter(|effect| effect.key().to_string() == e.key()))
                 .flat_map(|effect| ways(&effect))
                 .collect();
-            let best = (all.iter())
+            let fitted = (all.iter())
                 .map(|effects| log_evidence(study, effects, record))
                 .fold(f64::NEG_INFINITY, f64::max);
             Compared {
                 key: e.key(),
                 diagnosed: e.log_evidence,
-                fitted: best - alone - (all.len() as f64).ln(),
+                fitted: fitted - alone - (all.len() as f64).ln(),
+                is_candidate: e.log_evidence > best - CANDIDATES,
             }
         })
         .collect()
 }
 
-/// Nats from the best effect within which another may still be what is missing, and is fitted to its end.
+/// Nats from the best effect within which another may still be what is missing.
 const CANDIDATES: f64 = 6.0;
 /// Nats that a diagnosis credits a fit with that it gave up before its end.
 const CREDIT: f64 = 1.5;
@@ -109,12 +114,12 @@ const CREDIT: f64 = 1.5;
 /// Effects that may be what is missing and of which both do not say the same, and others of which a diagnosis says more than its credit
 /// allows.
 pub(crate) fn differing(name: &str, all: &[Compared]) -> Vec<String> {
-    let best = all.iter().map(|c| c.diagnosed).fold(0.0, f64::max);
     for c in all {
         let Compared {
             key,
             diagnosed,
             fitted,
+            ..
         } = c;
         println!(
             "{name:12} {key:40} {diagnosed:9.2} {fitted:9.2} {:7.2}",
@@ -123,9 +128,8 @@ pub(crate) fn differing(name: &str, all: &[Compared]) -> Vec<String> {
     }
     (all.iter())
         .filter(|c| {
-            let is_near = c.diagnosed > (best - CANDIDATES).max(1.0);
-            let least = if is_near { -0.5 } else { -0.5 - CREDIT };
-            let most = if is_near { 0.5 } else { f64::INFINITY };
+            let least = if c.is_candidate { -0.5 } else { -0.5 - CREDIT };
+            let most = if c.is_candidate { 0.5 } else { f64::INFINITY };
             let difference = c.fitted - c.diagnosed;
             c.diagnosed > 1.0 && !(least..=most).contains(&difference)
         })

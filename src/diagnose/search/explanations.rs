@@ -76,6 +76,19 @@ impl Explanations {
         self.extended.insert(set);
     }
 
+    /// log Z of all hypotheses together.
+    pub fn log_z(&self) -> f64 {
+        self.twin().log_z + self.posterior().log_evidence
+    }
+
+    /// Those that others have as well.
+    pub fn among(&self, others: &Self) -> Self {
+        let mut both = self.clone();
+        both.known.retain(|set, _| others.known.contains_key(set));
+        both.extended.retain(|set| others.extended.contains(set));
+        both
+    }
+
     /// The twin alone.
     pub fn twin(&self) -> &Explanation {
         &self.known[&TermSet::default()]

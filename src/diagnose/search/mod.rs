@@ -136,7 +136,7 @@ impl<E: Evidence> Search<E> {
                 Err(error) => Err(error),
             };
             match next {
-                Ok(next) if next.log_z() > best.log_z() + change.least_gain() => best = next,
+                Ok(next) if best.is_beaten_by(&next, &change) => best = next,
                 // A twin that its own step holds together may go nowhere with a finer one.
                 Ok(_) | Err(StudyError::NoStart) => {
                     best.refused.push(change);
@@ -241,9 +241,17 @@ impl<E: Evidence> Search<E> {
         Ok(Some(next))
     }
 
-    /// log Z of all hypotheses together.
-    fn log_z(&self) -> f64 {
-        self.known.twin().log_z + self.known.posterior().log_evidence
+    /// Returns whether all hypotheses together are likelier with a change. Where explanations were carried on to it, those alone count that
+    /// both searches have weighed: functions beside a set are asked again only once the change is kept.
+    fn is_beaten_by(&self, next: &Self, change: &Change) -> bool {
+        let [own, other] = match change.carries() {
+            true => [
+                self.known.among(&next.known).log_z(),
+                next.known.among(&self.known).log_z(),
+            ],
+            false => [self.known.log_z(), next.known.log_z()],
+        };
+        other > own + change.least_gain()
     }
 
     /// Returns whether something is missing.
