@@ -2,9 +2,9 @@
 
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
+use crate::estimator::project::PresetName;
 use crate::estimator::project::Project;
 use crate::estimator::readout::{Calibration, Readout};
-use crate::estimator::recipe::PresetName;
 use crate::estimator::settings::Settings;
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::math::one_row;
@@ -65,7 +65,7 @@ impl Estimator {
 
     /// The trained network.
     pub(crate) fn network(&self) -> &Arc<dyn Network> {
-        self.readout.network()
+        &self.readout.network
     }
 
     /// Twin and features, with a call counter of its own.
@@ -96,10 +96,8 @@ impl Estimator {
     pub fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
         let mut theta = self.readout.predict(features)?;
         let bounds = self.study().twin().parameters().bounds();
-        for mut row in theta.rows_mut() {
-            for (value, bounds) in row.iter_mut().zip(&bounds) {
-                *value = bounds.clamp(*value);
-            }
+        for (mut column, bounds) in theta.columns_mut().into_iter().zip(bounds) {
+            column.mapv_inplace(|value| bounds.clamp(value));
         }
         Ok(theta)
     }

@@ -6,11 +6,12 @@
 
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
+use crate::estimator::project::PresetName;
 use crate::estimator::project::Project;
 use crate::estimator::readout::{Calibration, Readout, Scaler, Standardiser};
-use crate::estimator::recipe::PresetName;
 use crate::estimator::settings::Settings;
 use crate::feature::FeatureRecipe;
+use crate::math::one_row;
 use crate::network::{Architecture, NamedTensor, bytes_of, values_of};
 use crate::storage::files::{replace, sha256, write_new};
 use crate::storage::untrusted::{message, read};
@@ -19,6 +20,7 @@ use ndarray::Array2;
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -34,14 +36,21 @@ const NETWORK: &str = "network/";
 impl Estimator {
     /// Writes a new file; it appears whole or not at all. The same estimator gives the same bytes.
     pub fn save(&self, path: &Path) -> Result<(), EstimatorError> {
-        let bytes = bytes(self).map_err(|problem| EstimatorError::file(path, problem))?;
-        write_new(path, &bytes).map_err(|error| EstimatorError::io(path, error))
+        self.write(path, write_new)
     }
 
     /// As [`save`](Self::save), in place of a file that is there.
     pub(super) fn save_again(&self, path: &Path) -> Result<(), EstimatorError> {
+        self.write(path, replace)
+    }
+
+    fn write(
+        &self,
+        path: &Path,
+        write: fn(&Path, &[u8]) -> io::Result<()>,
+    ) -> Result<(), EstimatorError> {
         let bytes = bytes(self).map_err(|problem| EstimatorError::file(path, problem))?;
-        replace(path, &bytes).map_err(|error| EstimatorError::io(path, error))
+        write(path, &bytes).map_err(|error| EstimatorError::io(path, error))
     }
 
     /// Reads a file made for one of `known`, studies or projects.
@@ -122,32 +131,20 @@ fn bytes(estimator: &Estimator) -> Result<Vec<u8>, String> {
     let (study, readout) = (estimator.study(), &estimator.readout);
     let calibration = &estimator.calibration;
     let mut raw: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = Vec::new();
-    for NamedTensor {
-        name,
-        shape,
-        values,
-    } in readout.network.weights()
-    {
-        let bytes = bytes_of(&values);
-        raw.push((format!("{NETWORK}{name}"), Dtype::F32, shape, bytes));
-    }
-    let mut put = |name: &str, shape: [usize; 2], values: &mut dyn Iterator<Item = &f64>| {
-        let bytes = values.flat_map(|v| v.to_le_bytes()).collect();
-        raw.push((name.to_owned(), Dtype::F64, shape.to_vec(), bytes));
-    };
-    for (name, row) in [
-        ("features.mean", &readout.inputs.mean),
-        ("targets.mean", &readout.targets.mean),
-        ("targets.scale", &readout.targets.scale),
-    ] {
-        put(name, [1, row.len()], &mut row.iter());
+    for tensor in readout.network.weights() {
+        let name = format!("{NETWORK}{}", tensor.name);
+        raw.push((name, Dtype::F32, tensor.shape, bytes_of(&tensor.values)));
     }
     for (name, matrix) in [
+        ("features.mean", &one_row(&readout.inputs.mean)),
+        ("targets.mean", &one_row(&readout.targets.mean)),
+        ("targets.scale", &one_row(&readout.targets.scale)),
         ("features.matrix", &readout.inputs.matrix),
         ("calibration.predicted", &calibration.predicted),
         ("calibration.truth", &calibration.truth),
     ] {
-        put(name, matrix.dim().into(), &mut matrix.iter());
+        let bytes = matrix.iter().flat_map(|v| v.to_le_bytes()).collect();
+        raw.push((name.to_owned(), Dtype::F64, matrix.shape().to_vec(), bytes));
     }
     let tensors = (raw.iter())
         .map(|(name, dtype, shape, bytes)| {
@@ -206,10 +203,9 @@ fn restored(bytes: &[u8], path: &Path, known: &[Project]) -> Result<Estimator, S
         let reason = format!("{width} features, the network reads {n}");
         return Err(not_whole(&reason));
     }
-    let row = |name: &str, width: usize| -> Result<Vec<f64>, String> {
-        Ok(matrix(&tensors, name, Some([1, width]))?
-            .into_iter()
-            .collect())
+    let row = |name: &str, width: usize| {
+        let matrix = matrix(&tensors, name, Some([1, width]))?;
+        Ok::<Vec<f64>, String>(matrix.into_iter().collect())
     };
     let truth = matrix(&tensors, "calibration.truth", None)?;
     let same = Some([truth.nrows(), d]);

@@ -10,15 +10,10 @@
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-A.
 
-mod settings;
-#[cfg(test)]
-mod tests;
-
-pub use settings::{GateForm, GateSettings};
-
 use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
-use crate::math::{Whitening, median, rank_p_value, to_vector};
+use crate::estimator::settings::{GateForm, GateSettings};
+use crate::math::{Whitening, median, quantile, rank_p_value, to_vector};
 use crate::progress::{Progress, Stage};
 use crate::record::Drive;
 use crate::twin::Noise;
@@ -80,10 +75,9 @@ debug_by_name!(GateTest<'_>);
 impl GateTest<'_> {
     /// Simulates the null at `theta`.
     pub fn at(&self, theta: &[f64]) -> Result<Gate, EstimatorError> {
-        let simulated = self.simulate(theta)?;
-        let whitening = self.settings.whiten(&simulated.whitening)?;
+        let (whitening, ranked) = self.simulate(theta)?;
         Ok(Gate {
-            null: whitening.squared_distances(simulated.ranked()),
+            null: whitening.squared_distances(&ranked),
             whitening,
             settings: self.settings.clone(),
         })
@@ -115,8 +109,8 @@ impl GateTest<'_> {
         let size = self.settings.whitening_simulations(self.simulator.dim());
         let null = self.settings.null;
         let stage = self.progress.stage("gate", size + 2 * null);
-        let whitening =
-            (self.settings).whiten(&self.repeat(theta, size, "whitening", &stage)?)?;
+        let features = self.repeat(theta, size, "whitening", &stage)?;
+        let whitening = whiten(self.settings, &features)?;
         let read = self.draws(null, near, "errors", &stage)?;
         let errors = &read.theta - &estimate(&read.features)?;
         let space = self.simulator.twin().parameters();
@@ -162,8 +156,7 @@ impl GateTest<'_> {
             settings: &settings,
             ..*self
         };
-        let simulated = calibrated.simulate(theta)?;
-        let whitening = settings.whiten(&simulated.whitening)?;
+        let (whitening, ranked) = calibrated.simulate(theta)?;
         let used = column_space(&whitening.apply_columns(jacobian));
         if whitening.rank() <= used.ncols() {
             return Ok(None);
@@ -172,33 +165,27 @@ impl GateTest<'_> {
             let residual = whitening.residual(x);
             (residual.norm_squared() - used.tr_mul(&residual).norm_squared()).max(0.0)
         };
-        let null = (simulated.ranked().rows().into_iter())
+        let null: Vec<f64> = (ranked.rows().into_iter())
             .map(|row| rest(&to_vector(&row)))
             .collect();
-        let statistic = rest(features);
-        let gate = Gate {
-            whitening,
-            null,
-            settings,
-        };
-        Ok(Some(gate.decide(statistic)))
+        Ok(Some(decide(&settings, &null, rest(features))))
     }
 
-    /// Simulates what [`at`](Self::at) needs: features for μ and S, and those to rank a record among.
-    fn simulate(&self, theta: &[f64]) -> Result<NullFeatures, EstimatorError> {
+    /// Simulates what [`at`](Self::at) needs: μ and S, and features to rank a record among; in the paper's form those of μ and S.
+    fn simulate(&self, theta: &[f64]) -> Result<(Whitening, Array2<f64>), EstimatorError> {
         let size = self.settings.whitening_simulations(self.simulator.dim());
         let fresh = match self.settings.form {
             GateForm::Calibrated => self.settings.null,
             GateForm::Paper => 0,
         };
         let stage = self.progress.stage("gate", size + fresh);
-        Ok(NullFeatures {
-            whitening: self.repeat(theta, size, "whitening", &stage)?,
-            fresh: match fresh {
-                0 => None,
-                _ => Some(self.repeat(theta, fresh, "null", &stage)?),
-            },
-        })
+        let features = self.repeat(theta, size, "whitening", &stage)?;
+        let whitening = whiten(self.settings, &features)?;
+        let ranked = match fresh {
+            0 => features,
+            _ => self.repeat(theta, fresh, "null", &stage)?,
+        };
+        Ok((whitening, ranked))
     }
 
     /// `size` simulations at one θ.
@@ -237,39 +224,47 @@ impl GateTest<'_> {
 #[derive(Debug, Clone)]
 pub struct Gate {
     /// μ and S^{-1/2} at θ.
-    pub whitening: Whitening,
+    whitening: Whitening,
     /// Squared whitened distances that a record is ranked among.
-    pub null: Vec<f64>,
+    null: Vec<f64>,
     settings: GateSettings,
 }
 
 impl Gate {
     /// Tests features x.
     pub fn test(&self, features: &DVector<f64>) -> GateOutcome {
-        self.decide(self.whitening.squared_distance(features))
+        let statistic = self.whitening.squared_distance(features);
+        decide(&self.settings, &self.null, statistic)
     }
+}
 
-    fn decide(&self, statistic: f64) -> GateOutcome {
-        let p_value = rank_p_value(&self.null, statistic);
-        let alpha = self.settings.alpha;
-        let out_of_distribution = match self.settings.form {
+/// Ranks the statistic of a record among those of the null.
+fn decide(settings: &GateSettings, null: &[f64], statistic: f64) -> GateOutcome {
+    let (p_value, alpha) = (rank_p_value(null, statistic), settings.alpha);
+    GateOutcome {
+        statistic,
+        p_value,
+        p_error: (p_value * (1.0 - p_value) / (null.len() as f64 + 1.0)).sqrt(),
+        simulations: null.len(),
+        alpha,
+        out_of_distribution: match settings.form {
             GateForm::Calibrated => p_value <= alpha,
             // The paper rejects above the empirical quantile of the K values themselves.
-            GateForm::Paper => {
-                let threshold = crate::math::quantile(&self.null, 1.0 - alpha);
-                threshold.is_ok_and(|threshold| statistic > threshold)
-            }
-        };
-        let simulations = self.null.len();
-        GateOutcome {
-            statistic,
-            p_value,
-            p_error: (p_value * (1.0 - p_value) / (simulations as f64 + 1.0)).sqrt(),
-            simulations,
-            alpha,
-            out_of_distribution,
-        }
+            GateForm::Paper => quantile(null, 1.0 - alpha).is_ok_and(|most| statistic > most),
+        },
     }
+}
+
+/// μ and S^{-1/2} from simulated features, in the form of the test.
+pub fn whiten(
+    settings: &GateSettings,
+    features: &Array2<f64>,
+) -> Result<Whitening, EstimatorError> {
+    match settings.form {
+        GateForm::Calibrated => Whitening::calibrated(features),
+        GateForm::Paper => Whitening::regularised(features, settings.epsilon),
+    }
+    .map_err(EstimatorError::Whitening)
 }
 
 /// Medians, entry by entry, of whitened Jacobians.
@@ -297,14 +292,5 @@ fn column_space(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     )
 }
 
-/// Features simulated at one θ.
-struct NullFeatures {
-    whitening: Array2<f64>,
-    fresh: Option<Array2<f64>>,
-}
-
-impl NullFeatures {
-    fn ranked(&self) -> &Array2<f64> {
-        self.fresh.as_ref().unwrap_or(&self.whitening)
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -44,32 +44,29 @@ mod file;
 mod paper;
 mod pretrain;
 mod project;
-pub(crate) mod readout;
-mod recipe;
+mod readout;
 mod settings;
 
 pub(crate) mod fuzzing;
 
 pub(crate) mod bank;
-mod cloud;
-pub(crate) mod gate;
-pub(crate) mod refine;
+mod gate;
+mod refine;
 pub(crate) mod shards;
 
-pub use cloud::{CloudSampler, CloudSettings};
 pub use error::EstimatorError;
 pub(crate) use estimate::Contributions;
 pub use estimate::{Estimate, EstimateOptions, PointEstimate, Refit, Together, Tracking};
-#[cfg(test)]
-pub(crate) use estimate::{KeptEstimate, Stages};
 pub use estimator::Estimator;
-pub use gate::{GateForm, GateOutcome, GateSettings};
-pub(crate) use pretrain::GivenBank;
+pub use gate::GateOutcome;
 pub(crate) use pretrain::Pretraining;
 pub use pretrain::{PretrainOptions, pretrain};
-pub use project::Project;
+pub(crate) use project::Recipe;
+pub use project::{PresetName, Project};
 pub(crate) use readout::INTERVAL_LEVEL;
-pub use recipe::PresetName;
-pub(crate) use recipe::Recipe;
-pub use refine::RefineSettings;
-pub use settings::{Inputs, Settings};
+pub use settings::{
+    CloudSampler, CloudSettings, GateForm, GateSettings, Inputs, RefineSettings, Settings,
+};
+
+#[cfg(test)]
+pub(crate) use estimate::Stages;

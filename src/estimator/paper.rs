@@ -3,11 +3,10 @@
 //! Source: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator"; what its text leaves open is from the authors'
 //! code.
 
-use crate::estimator::cloud::{CloudSampler, CloudSettings};
-use crate::estimator::gate::{GateForm, GateSettings};
-use crate::estimator::recipe::{Recipe, Steps, regression};
-use crate::estimator::refine::RefineSettings;
-use crate::estimator::settings::{Inputs, Settings};
+use crate::estimator::project::{Recipe, Steps, regression};
+use crate::estimator::settings::{
+    CloudSampler, CloudSettings, GateForm, GateSettings, Inputs, RefineSettings, Settings,
+};
 use crate::network::{Deep, Training, architecture};
 use crate::study::Study;
 

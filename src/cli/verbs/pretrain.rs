@@ -4,7 +4,7 @@ use crate::cli::options::seconds;
 use crate::cli::prelude::*;
 use crate::estimator::bank::{Bank, file};
 use crate::estimator::shards::{BankPlan, ShardedBank};
-use crate::estimator::{GivenBank, PretrainOptions, Pretraining, Project};
+use crate::estimator::{PretrainOptions, Pretraining, Project};
 use crate::storage::work::checksum;
 use std::time::{Duration, Instant};
 
@@ -58,16 +58,15 @@ impl Verb for Pretrain {
             epochs: self.epochs,
             seed: context.seed,
         };
-        let pretraining = Pretraining::new(&project, settings).with_checkpoints(self.checkpoint);
-        let (estimator, history) = match &self.bank {
-            None => pretraining.write(&self.out, context.progress)?,
-            Some(path) => {
-                let (bank, checksum) = given(&project, path, &settings)?;
-                let bank = bank.as_ref();
-                (pretraining.with_bank(GivenBank { bank, checksum }))
-                    .write(&self.out, context.progress)?
-            }
+        let given = self.bank.as_ref();
+        let pretraining = Pretraining {
+            bank: given
+                .map(|path| bank(&project, path, &settings))
+                .transpose()?,
+            every: self.checkpoint,
+            ..Pretraining::new(&project, settings)
         };
+        let (estimator, history) = pretraining.write(&self.out, context.progress)?;
         let seconds = clock.elapsed().as_secs_f64();
         let bank = estimator.settings().bank_size;
         let loss = history.training.last().copied().unwrap_or(f64::NAN);
@@ -98,7 +97,7 @@ impl Verb for Pretrain {
 }
 
 /// A bank that is there, and its checksum.
-fn given(
+fn bank(
     project: &Project,
     path: &Path,
     settings: &PretrainOptions,

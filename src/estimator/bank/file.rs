@@ -7,7 +7,7 @@
 //!
 //! Both keep every bit. The same draws give the same bytes: an archive carries no time.
 
-use super::draws::Draws;
+use super::Draws;
 use super::npy::{self, Npz, archive};
 use crate::estimator::error::EstimatorError;
 use crate::storage::files::write_new;
@@ -20,9 +20,8 @@ use std::path::Path;
 /// Remedy for a file from elsewhere.
 const GIVE: &str = "give theta (rows × parameters) and features (rows × features), one simulation a row, all finite";
 
-enum Form {
-    Npz,
-    Csv,
+fn extension(path: &Path) -> &str {
+    (path.extension().and_then(|e| e.to_str())).unwrap_or_default()
 }
 
 fn other_form(path: &Path) -> EstimatorError {
@@ -31,58 +30,36 @@ fn other_form(path: &Path) -> EstimatorError {
     EstimatorError::file(path, problem)
 }
 
-fn form(path: &Path) -> Result<Form, EstimatorError> {
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("npz") => Ok(Form::Npz),
-        Some("csv") => Ok(Form::Csv),
-        _ => Err(other_form(path)),
-    }
+/// Returns whether a path has the name of a file of rows.
+pub(crate) fn is_named(path: &Path) -> bool {
+    matches!(extension(path), "npz" | "csv")
 }
 
 /// Writes a new file of features alone, one record a row: `.npy`, `.npz` (array `features`) or `.csv` (`x1` … `xn`).
 pub(crate) fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), EstimatorError> {
-    let bytes = match path.extension().and_then(|e| e.to_str()) {
-        Some("npy") => {
-            let mut bytes = Vec::new();
-            npy::write(features, &mut bytes).map(|()| bytes)
-        }
-        Some("npz") => archive(&[("features", features)]),
-        Some("csv") => csv_text(&features_alone(features), &[]),
+    let bytes = match extension(path) {
+        "npy" => npy::bytes(features),
+        "npz" => archive(&[("features", features)]),
+        "csv" => features_csv_text(features).map(String::into_bytes),
         _ => return Err(other_form(path)),
     };
-    bytes
-        .and_then(|bytes| write_new(path, &bytes))
-        .map_err(|error| EstimatorError::io(path, error))
+    write_bytes(path, bytes)
 }
 
 /// The CSV text of [`write_features`].
 pub(crate) fn features_csv_text(features: &Array2<f64>) -> io::Result<String> {
-    let bytes = csv_text(&features_alone(features), &[])?;
+    let bytes = csv_text(&Array2::zeros((features.nrows(), 0)), features, &[])?;
     String::from_utf8(bytes).map_err(io::Error::other)
-}
-
-fn features_alone(features: &Array2<f64>) -> Draws {
-    Draws {
-        theta: Array2::zeros((features.nrows(), 0)),
-        features: features.clone(),
-        redrawn: 0,
-    }
-}
-
-/// Returns whether a path has the name of a file of rows.
-pub(crate) fn is_named(path: &Path) -> bool {
-    form(path).is_ok()
 }
 
 /// Writes a new file in the form that its name ends with; `names` are the parameters'.
 pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), EstimatorError> {
-    let bytes = match form(path)? {
-        Form::Npz => npz(draws),
-        Form::Csv => csv_text(draws, names),
+    let bytes = match extension(path) {
+        "npz" => npz(draws),
+        "csv" => csv_text(&draws.theta, &draws.features, names),
+        _ => return Err(other_form(path)),
     };
-    bytes
-        .and_then(|bytes| write_new(path, &bytes))
-        .map_err(|error| EstimatorError::io(path, error))
+    write_bytes(path, bytes)
 }
 
 /// Writes a new `.npz` archive of these matrices.
@@ -90,39 +67,40 @@ pub(crate) fn write_matrices(
     path: &Path,
     matrices: &[(&str, &Array2<f64>)],
 ) -> Result<(), EstimatorError> {
-    archive(matrices)
+    write_bytes(path, archive(matrices))
+}
+
+fn write_bytes(path: &Path, bytes: io::Result<Vec<u8>>) -> Result<(), EstimatorError> {
+    bytes
         .and_then(|bytes| write_new(path, &bytes))
         .map_err(|error| EstimatorError::io(path, error))
 }
 
 /// Reads a file in the form that its name ends with, of a twin with these parameters.
 pub fn read(path: &Path, names: &[&str]) -> Result<Draws, EstimatorError> {
-    let form = form(path)?;
+    if !is_named(path) {
+        return Err(other_form(path));
+    }
     let file = File::open(path).map_err(|error| EstimatorError::io(path, error))?;
-    let wrong = |reason: String| EstimatorError::no_bank(path, &reason, GIVE);
-    let draws = match form {
-        Form::Npz => from_npz(io::BufReader::new(file)).map_err(wrong)?,
-        Form::Csv => from_csv(file, names).map_err(wrong)?,
+    let draws = match extension(path) {
+        "npz" => from_npz(io::BufReader::new(file)),
+        _ => from_csv(file, names),
     };
-    check(&draws, names.len()).map_err(wrong)?;
-    Ok(draws)
+    draws
+        .and_then(|draws| check(&draws, names.len()).map(|()| draws))
+        .map_err(|reason| EstimatorError::no_bank(path, &reason, GIVE))
 }
 
 /// Checks whether the rows are whole, finite, and of so many parameters.
 pub(crate) fn check(draws: &Draws, parameters: usize) -> Result<(), String> {
     let (theta, features) = (&draws.theta, &draws.features);
     if theta.ncols() != parameters {
-        return Err(format!(
-            "{} parameters, the twin has {parameters}",
-            theta.ncols()
-        ));
+        let given = theta.ncols();
+        return Err(format!("{given} parameters, the twin has {parameters}"));
     }
     if theta.nrows() != features.nrows() {
-        return Err(format!(
-            "{} rows of theta, {} of features",
-            theta.nrows(),
-            features.nrows()
-        ));
+        let (rows, of) = (theta.nrows(), features.nrows());
+        return Err(format!("{rows} rows of theta, {of} of features"));
     }
     for (what, matrix) in [("theta", theta), ("features", features)] {
         if let Some(((row, column), value)) = matrix.indexed_iter().find(|(_, v)| !v.is_finite()) {
@@ -147,11 +125,18 @@ pub(crate) fn from_npz(archive: impl Read + Seek) -> Result<Draws, String> {
     })
 }
 
-fn csv_text(draws: &Draws, names: &[&str]) -> io::Result<Vec<u8>> {
+/// Names of the columns of a CSV file of n features.
+fn header(names: &[&str], n: usize) -> Vec<String> {
+    let features = (1..=n).map(|j| format!("x{j}"));
+    (names.iter().map(|name| (*name).to_owned()))
+        .chain(features)
+        .collect()
+}
+
+fn csv_text(theta: &Array2<f64>, features: &Array2<f64>, names: &[&str]) -> io::Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
-    let features = (1..=draws.features.ncols()).map(|j| format!("x{j}"));
-    csv.write_record(names.iter().map(|name| (*name).to_owned()).chain(features))?;
-    for (theta, features) in draws.theta.rows().into_iter().zip(draws.features.rows()) {
+    csv.write_record(header(names, features.ncols()))?;
+    for (theta, features) in theta.rows().into_iter().zip(features.rows()) {
         csv.write_record(theta.iter().chain(features).map(f64::to_string))?;
     }
     csv.into_inner().map_err(|error| error.into_error())
@@ -159,18 +144,13 @@ fn csv_text(draws: &Draws, names: &[&str]) -> io::Result<Vec<u8>> {
 
 fn from_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
     let mut csv = Rows::new(file);
-    let header = csv.header().map_err(|error| error.to_string())?;
+    let found = csv.header().map_err(|error| error.to_string())?;
     let d = names.len();
-    let n = header.len().saturating_sub(d);
-    let features = (1..=n).map(|j| format!("x{j}"));
-    if n == 0
-        || !header
-            .iter()
-            .eq(names.iter().map(|name| (*name).to_owned()).chain(features))
-    {
+    let n = found.len().saturating_sub(d);
+    if n == 0 || !found.iter().eq(header(names, n).iter()) {
         return Err(format!("the header is not {},x1,x2,…", names.join(",")));
     }
-    let (mut theta, mut rest, mut rows) = (Vec::new(), Vec::new(), 0);
+    let (mut values, mut rows) = ([Vec::new(), Vec::new()], 0);
     let mut cells = csv::StringRecord::new();
     while csv.read(&mut cells).map_err(|error| error.to_string())? {
         if (rows + 1) * (d + n) > MOST_NUMBERS {
@@ -179,23 +159,21 @@ fn from_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
             ));
         }
         for (column, cell) in cells.iter().enumerate() {
-            let value: f64 = (cell.parse()).map_err(|_| {
-                format!(
-                    "row {rows}, column {column}: \"{}\" is no number",
-                    excerpt(cell)
-                )
-            })?;
-            match column < d {
-                true => theta.push(value),
-                false => rest.push(value),
-            }
+            let value: Result<f64, _> = cell.parse();
+            values[usize::from(column >= d)].push(value.map_err(|_| {
+                let cell = excerpt(cell);
+                format!("row {rows}, column {column}: \"{cell}\" is no number")
+            })?);
         }
         rows += 1;
     }
-    let matrix = |width, values| Array2::from_shape_vec((rows, width), values);
+    let [theta, features] = values;
+    let matrix = |width, values| {
+        Array2::from_shape_vec((rows, width), values).map_err(|error| error.to_string())
+    };
     Ok(Draws {
-        theta: matrix(d, theta).map_err(|error| error.to_string())?,
-        features: matrix(n, rest).map_err(|error| error.to_string())?,
+        theta: matrix(d, theta)?,
+        features: matrix(n, features)?,
         redrawn: 0,
     })
 }

@@ -17,40 +17,35 @@ const LONGEST_HEADER: usize = 4096;
 /// The header's length is a multiple of this.
 const ALIGNMENT: usize = 64;
 
-/// Writes a matrix of 64-bit numbers, little-endian, in the order it has in memory.
-pub(super) fn write(matrix: &Array2<f64>, to: &mut impl Write) -> io::Result<()> {
+/// Returns the bytes of a matrix of 64-bit numbers, little-endian, in the order it has in memory.
+pub(super) fn bytes(matrix: &Array2<f64>) -> io::Result<Vec<u8>> {
     let by_columns = !matrix.is_standard_layout() && matrix.t().is_standard_layout();
-    let order = if by_columns { "True" } else { "False" };
+    let (order, numbers) = match by_columns {
+        true => ("True", matrix.t()),
+        false => ("False", matrix.view()),
+    };
     let (rows, columns) = matrix.dim();
     let text =
         format!("{{'descr': '<f8', 'fortran_order': {order}, 'shape': ({rows}, {columns})}}");
     let before = MAGIC.len() + 4;
     let length = (before + text.len() + 1) / ALIGNMENT * ALIGNMENT + ALIGNMENT - before;
-    to.write_all(MAGIC)?;
-    to.write_all(&[1, 0])?;
-    to.write_all(&(length as u16).to_le_bytes())?;
-    writeln!(to, "{text:width$}", width = length - 1)?;
-    let numbers: Vec<u8> = if by_columns {
-        matrix.t().iter().flat_map(|v| v.to_le_bytes()).collect()
-    } else {
-        matrix.iter().flat_map(|v| v.to_le_bytes()).collect()
-    };
-    to.write_all(&numbers)
+    let mut bytes = [MAGIC, &[1, 0], &(length as u16).to_le_bytes()].concat();
+    writeln!(bytes, "{text:width$}", width = length - 1)?;
+    bytes.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));
+    Ok(bytes)
 }
 
 /// Reads a matrix of 64-bit or 32-bit numbers from `size` bytes.
 pub(super) fn read(from: &mut impl Read, size: u64) -> Result<Array2<f64>, String> {
     let (text, rest) = header_text(from, size)?;
-    let ArrayHeader {
-        shape,
-        width,
-        number,
-    } = ArrayHeader::parse(&text, rest)?;
+    let header = ArrayHeader::parse(&text, rest)?;
     let mut bytes = Vec::new();
     let unread = |error: &dyn std::fmt::Display| format!("its numbers cannot be read: {error}");
     (from.take(rest).read_to_end(&mut bytes)).map_err(|error| unread(&error))?;
-    let numbers = bytes.chunks_exact(width).map(number).collect();
-    Array2::from_shape_vec(shape, numbers).map_err(|error| unread(&error))
+    let numbers = (bytes.chunks_exact(header.width))
+        .map(header.number)
+        .collect();
+    Array2::from_shape_vec(header.shape, numbers).map_err(|error| unread(&error))
 }
 
 /// Reads the header's text; also returns the number of bytes after it.
@@ -91,10 +86,9 @@ impl ArrayHeader {
         let no_matrix = || format!("its header \"{}\" describes no matrix", text.trim());
         // A matrix needs no other bracket than these two pairs.
         let inside = (text.trim().strip_prefix('{')).and_then(|text| text.strip_suffix('}'));
-        let (before, after) = inside
-            .and_then(|text| text.split_once('('))
-            .ok_or_else(no_matrix)?;
-        let (shape, after) = after.split_once(')').ok_or_else(no_matrix)?;
+        let parts = inside.and_then(|text| text.split_once('('));
+        let parts = parts.and_then(|(before, rest)| Some((before, rest.split_once(')')?)));
+        let (before, (shape, after)) = parts.ok_or_else(no_matrix)?;
         let (mut descriptor, mut order) = (None, None);
         for entry in before.split(',').chain(after.split(',')).map(str::trim) {
             match entry.split_once(':').map(|(k, v)| (k.trim(), v.trim())) {
@@ -133,11 +127,14 @@ impl ArrayHeader {
             Some(numbers) if numbers > MOST_NUMBERS as u64 => Err(format!(
                 "its shape ({shape}) has more than {MOST_NUMBERS} numbers; keep such a bank in shards"
             )),
-            Some(numbers) if numbers * width as u64 == rest => Ok(Self {
-                shape: (rows as usize, columns as usize).set_f(by_columns),
-                width,
-                number,
-            }),
+            Some(numbers) if numbers * width as u64 == rest => {
+                let shape = (rows as usize, columns as usize).set_f(by_columns);
+                Ok(Self {
+                    shape,
+                    width,
+                    number,
+                })
+            }
             _ => Err(format!(
                 "its shape ({shape}) does not fit the {rest} bytes that it has"
             )),
@@ -153,7 +150,7 @@ pub(super) fn archive(matrices: &[(&str, &Array2<f64>)]) -> io::Result<Vec<u8>> 
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, matrix) in matrices {
         archive.start_file(format!("{name}.npy"), options)?;
-        write(matrix, &mut archive)?;
+        archive.write_all(&bytes(matrix)?)?;
     }
     Ok(archive.finish()?.into_inner())
 }
@@ -195,9 +192,7 @@ mod tests {
     use ndarray::array;
 
     fn written(matrix: &Array2<f64>) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        write(matrix, &mut bytes).unwrap();
-        bytes
+        bytes(matrix).unwrap()
     }
 
     fn read_all(bytes: &[u8]) -> Result<Array2<f64>, String> {

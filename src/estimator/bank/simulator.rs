@@ -1,13 +1,23 @@
-//! A twin seen through its features.
+//! A twin seen through its features, and many simulations of it, row by row.
 
+use super::{Draw, Draws};
 use crate::estimator::error::EstimatorError;
 use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
+use crate::progress::Stage;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Noise, Twin};
 use nalgebra::DVector;
+use ndarray::{Array2, aview1};
 use rayon::prelude::*;
+use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Failures of one sample before the draws count as hopeless; a twin that fails nine times in ten passes.
+const ATTEMPTS: usize = 200;
+/// Share of failed draws beyond which the work stops.
+const HOPELESS: f64 = 0.9;
 
 /// A twin seen through its features; counts every simulation, also those that the features make.
 #[derive(Clone)]
@@ -101,15 +111,17 @@ impl FeatureSimulator {
             .filter_map(|((_, drive, _), outputs)| Some((*drive, outputs.as_ref().ok()?)))
             .collect();
         let mut features = self.map.extract_all(&simulated).into_iter();
+        let rejected = |what: &str| EstimatorError::Rejected(what.into());
         (outputs.into_iter())
             .map(|outputs| {
                 outputs?;
-                let missing = || EstimatorError::Rejected("the features are missing".into());
-                features
-                    .next()
-                    .ok_or_else(missing)?
-                    .map_err(refused)
-                    .and_then(finite)
+                let found = features.next();
+                let found = found.ok_or_else(|| rejected("the features are missing"))?;
+                let found = found.map_err(refused)?;
+                match found.iter().all(|v| v.is_finite()) {
+                    true => Ok(found),
+                    false => Err(rejected("features are not finite")),
+                }
             })
             .collect()
     }
@@ -141,6 +153,125 @@ impl FeatureSimulator {
     }
 }
 
+/// One simulation of a set, or the draws so far that gave none.
+#[derive(Default)]
+struct DrawnRow {
+    /// θ and its features.
+    drawn: Option<[Vec<f64>; 2]>,
+    /// Draws that were out of bounds.
+    rejected: usize,
+    /// Draws that diverged or had no features.
+    failed: usize,
+    /// Why the last of these failed.
+    reason: Option<String>,
+}
+
+impl FeatureSimulator {
+    /// Simulations `rows` on all cores of the current rayon pool; row i depends on `noise(i)` alone.
+    ///
+    /// `draw(i, attempt, noise)` says where to simulate, or rejects (`None`: out of bounds). A rejected or failed draw is
+    /// drawn again with the child noise of the next attempt, and counted; failures alone can stop the work.
+    pub fn draws<'a>(
+        &self,
+        rows: Range<u64>,
+        noise: impl Fn(u64) -> Noise + Sync,
+        draw: impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, EstimatorError> + Sync,
+        stage: &Stage,
+    ) -> Result<Draws, EstimatorError> {
+        let numbers: Vec<u64> = rows.collect();
+        let chunks = (numbers.par_chunks(self.at_once()))
+            .map(|numbers| {
+                let rows = self.chunk(numbers, &noise, &draw)?;
+                numbers.iter().try_for_each(|_| stage.tick())?;
+                Ok(rows)
+            })
+            .collect::<Result<Vec<_>, EstimatorError>>()?;
+        let rows: Vec<DrawnRow> = chunks.into_iter().flatten().collect();
+        let failed: usize = rows.iter().map(|row| row.failed).sum();
+        let tried = rows.len() + failed;
+        if failed as f64 > HOPELESS * tried as f64 {
+            let reason = rows.into_iter().rev().find_map(|row| row.reason);
+            return Err(EstimatorError::Hopeless {
+                failed,
+                tried,
+                reason: reason.unwrap_or_default(),
+            });
+        }
+        let mut all = Draws::zeros(rows.len(), self.twin.parameters().len(), self.dim());
+        all.redrawn = failed + rows.iter().map(|row| row.rejected).sum::<usize>();
+        for (i, [theta, features]) in rows.iter().filter_map(|r| r.drawn.as_ref()).enumerate() {
+            all.theta.row_mut(i).assign(&aview1(theta));
+            all.features.row_mut(i).assign(&aview1(features));
+        }
+        Ok(all)
+    }
+
+    /// Rows of these numbers, the features of all that are drawn found at once.
+    fn chunk<'a>(
+        &self,
+        numbers: &[u64],
+        noise: &impl Fn(u64) -> Noise,
+        draw: &impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, EstimatorError>,
+    ) -> Result<Vec<DrawnRow>, EstimatorError> {
+        let mut rows: Vec<DrawnRow> = numbers.iter().map(|_| DrawnRow::default()).collect();
+        while rows.iter().any(|row| row.drawn.is_none()) {
+            let mut places: Vec<(&mut DrawnRow, Draw<'a>, Noise)> = vec![];
+            let missing = rows.iter_mut().zip(numbers);
+            for (row, &number) in missing.filter(|(row, _)| row.drawn.is_none()) {
+                let attempt = row.rejected + row.failed;
+                if row.failed.max(row.rejected) >= ATTEMPTS {
+                    return Err(EstimatorError::Hopeless {
+                        failed: attempt,
+                        tried: attempt,
+                        reason: (row.reason.take()).unwrap_or_else(|| "out of bounds".into()),
+                    });
+                }
+                let noise = match attempt {
+                    0 => noise(number),
+                    _ => noise(number).child(&format!("attempt {attempt}")),
+                };
+                match draw(number, attempt, noise)? {
+                    Some(draw) => places.push((row, draw, noise)),
+                    None => row.rejected += 1,
+                }
+            }
+            let all: Vec<_> = (places.iter())
+                .map(|(_, draw, noise)| (&draw.theta[..], &*draw.drive, *noise))
+                .collect();
+            let features = self.features(&all);
+            for ((row, draw, _), features) in places.into_iter().zip(features) {
+                match features {
+                    Ok(features) => row.drawn = Some([draw.theta, features]),
+                    Err(EstimatorError::Rejected(text)) => {
+                        row.failed += 1;
+                        row.reason = Some(text);
+                    }
+                    Err(error) => return Err(error),
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    /// `size` simulations at one θ under one drive.
+    pub fn repeat(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        size: usize,
+        noise: impl Fn(u64) -> Noise + Sync,
+        stage: &Stage,
+    ) -> Result<Array2<f64>, EstimatorError> {
+        let draw = |_, _, _| {
+            Ok(Some(Draw {
+                theta: theta.to_vec(),
+                drive: Cow::Borrowed(drive),
+            }))
+        };
+        Ok(self.draws(0..size as u64, noise, draw, stage)?.features)
+    }
+}
+
 /// Features that are not there for reasons of one simulation reject it.
 fn refused(error: FeatureError) -> EstimatorError {
     let is_of_one = match &error {
@@ -157,13 +288,6 @@ fn refused(error: FeatureError) -> EstimatorError {
     }
 }
 
-fn finite(features: Vec<f64>) -> Result<Vec<f64>, EstimatorError> {
-    match features.iter().all(|v| v.is_finite()) {
-        true => Ok(features),
-        false => Err(EstimatorError::Rejected("features are not finite".into())),
-    }
-}
-
 /// The twin with its runs counted.
 fn counted(twin: &Twin, calls: &Arc<AtomicUsize>) -> Twin {
     let counter = calls.clone();
@@ -171,4 +295,93 @@ fn counted(twin: &Twin, calls: &Arc<AtomicUsize>) -> Twin {
         counter.fetch_add(1, Ordering::Relaxed);
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::feature::Ar;
+    use crate::progress::Progress;
+    use crate::record::{Signal, Signals};
+    use crate::twin::{DigitalTwin, Parameter, ParameterSpace, SimulationError};
+    use crate::twins::VanDerPol;
+    use std::sync::Arc;
+
+    fn simulator(twin: impl DigitalTwin + 'static) -> FeatureSimulator {
+        FeatureSimulator::new(Arc::new(twin), &Ar { order: 2 }).unwrap()
+    }
+
+    fn bank(simulator: &FeatureSimulator, size: usize) -> Result<Draws, EstimatorError> {
+        let drive = Drive::autonomous(0.05, 60).unwrap();
+        let space = simulator.twin().parameters();
+        simulator.draws(
+            0..size as u64,
+            |i| Noise::new(1, "bank", i),
+            |_, _, noise| {
+                Ok(Some(Draw {
+                    theta: space.draw_prior(noise),
+                    drive: Cow::Borrowed(&drive),
+                }))
+            },
+            &Progress::silent().stage("bank", size),
+        )
+    }
+
+    #[test]
+    fn threads_and_size_change_no_sample() {
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| bank(&simulator(VanDerPol), 40).unwrap())
+        };
+        assert_eq!(on(1), on(3));
+        let short = bank(&simulator(VanDerPol), 10).unwrap();
+        assert_eq!(short.features.row(9), on(2).features.row(9));
+    }
+
+    /// Diverges on a share of its prior.
+    struct Fragile(f64);
+    impl DigitalTwin for Fragile {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("a", "", 0.0, 1.0)])
+        }
+        fn signals(&self) -> Signals {
+            Signals {
+                inputs: vec![],
+                ..Signals::default()
+            }
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            if theta[0] < self.0 {
+                return Err(SimulationError::Diverged { at: 0.0 });
+            }
+            let mut source = noise.source("v");
+            Ok(Signal::from_shape_simple_fn((drive.samples(), 1), || {
+                source.normal()
+            }))
+        }
+    }
+
+    #[test]
+    fn diverged_draws_are_redrawn_and_counted() {
+        let simulator = simulator(Fragile(0.5));
+        let draws = bank(&simulator, 200).unwrap();
+        assert!(draws.theta.iter().all(|a| *a >= 0.5));
+        // Failures before 200 successes at ½: mean 200, sd 20.
+        assert!((100..300).contains(&draws.redrawn), "{}", draws.redrawn);
+        assert_eq!(simulator.calls(), 200 + draws.redrawn);
+    }
+
+    #[test]
+    fn a_twin_that_nearly_always_diverges_stops_the_work() {
+        let error = bank(&simulator(Fragile(0.97)), 50).unwrap_err();
+        assert!(matches!(error, EstimatorError::Hopeless { .. }), "{error}");
+    }
 }

@@ -6,28 +6,28 @@
 //!                               └─▶ refit: Gauss–Newton, cloud, tuned heads ─▶ θ̂ ─ gate again
 //! ```
 
-mod gates;
+mod cloud;
 mod outcome;
 mod record_fit;
 mod refit;
 mod together;
 mod tracking;
-mod tune;
 mod warnings;
 
+pub(crate) use outcome::Stages;
 pub use outcome::{Estimate, EstimateOptions, PointEstimate, Refit};
-pub(crate) use outcome::{KeptEstimate, Stages};
+pub(crate) use refit::Contributions;
 pub use together::Together;
 pub use tracking::Tracking;
-pub(crate) use tune::Contributions;
 
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
-use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
-use crate::estimator::recipe::Steps;
-use crate::estimator::refine::{FeatureInformation, RefineSettings, Refinement};
-use crate::estimator::settings::Settings;
+use crate::estimator::gate::{GateOutcome, GateTest};
+use crate::estimator::project::Steps;
+use crate::estimator::readout::Spread;
+use crate::estimator::refine::{RefinedEstimate, Refinement};
+use crate::estimator::settings::{GateForm, GateSettings, RefineSettings, Settings};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::twin::Noise;
@@ -91,6 +91,7 @@ impl Estimator {
         };
         let run = EstimateRun {
             estimator: self,
+            simulator: &simulator,
             settings,
             record,
             observed: &observed,
@@ -99,12 +100,12 @@ impl Estimator {
             seed: options.seed,
             progress,
         };
-        let gate = run.gate(&simulator, &initial.theta)?;
+        let gate = run.gate(&initial.theta)?;
         let seconds = (predict, lap.elapsed().as_secs_f64());
         let is_kept = steps.trusts_prior && !gate.out_of_distribution && !options.always_refine;
         let (stages, tracking) = match is_kept {
-            true => run.keep(&simulator, &initial)?,
-            false => run.refine(&simulator, &initial, steps)?,
+            true => run.keep(&initial)?,
+            false => run.refine(&initial, steps)?,
         };
         let answer = match &stages {
             Stages::Refitted(refit) if !refit.is_refused => refit.answer.clone(),
@@ -145,16 +146,17 @@ impl Estimator {
     /// The network's estimate, with the errors of simulations of the prior that were predicted nearby.
     fn initial(&self, theta: Vec<f64>) -> PointEstimate {
         let space = self.study().twin().parameters();
-        let spread = (self.calibration).spread(&theta, &space.widths(), INTERVAL_LEVEL);
-        let unknown = || Spread::normal(vec![f64::NAN; theta.len()], INTERVAL_LEVEL);
-        let spread = spread.unwrap_or_else(unknown);
-        PointEstimate::new(theta, spread, &space)
+        let spread = self.calibration.spread(&theta, &space.widths());
+        let unknown = || Spread::normal(vec![f64::NAN; theta.len()]);
+        PointEstimate::new(theta.clone(), spread.unwrap_or_else(unknown), &space)
     }
 }
 
 /// One estimate under way.
 struct EstimateRun<'a> {
     estimator: &'a Estimator,
+    /// The twin in the record's noise, and its features.
+    simulator: &'a FeatureSimulator,
     settings: &'a Settings,
     record: &'a Record,
     observed: &'a DVector<f64>,
@@ -183,25 +185,110 @@ impl EstimateRun<'_> {
         }
     }
 
-    /// Keeps the network's estimate.
-    fn keep(
+    /// The test of the network's estimate: is the record what the twin makes there?
+    fn gate(&self, initial: &[f64]) -> Result<GateOutcome, EstimatorError> {
+        let simulator = &self.in_drawn_noise(self.simulator)?;
+        if self.settings.gate.form == GateForm::Paper {
+            let test = self.gate_test(simulator, &self.settings.gate, "gate");
+            return Ok(test.at(initial)?.test(self.observed));
+        }
+        // The hypothesis is a θ in the prior; the network extrapolates, and errs, beyond.
+        let space = self.estimator.study().twin().parameters();
+        let initial = space.clamp_to_prior(initial);
+        let near = (self.estimator.calibration).truths_near(&initial, &space.widths());
+        let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
+        self.sure(simulator, "gate", |test| {
+            let jacobians = refinement.jacobians_at(&initial)?;
+            let predict = |features: &_| Ok(self.estimator.predict(features)?);
+            let gate = test.at_estimate(&initial, &near, &jacobians, predict)?;
+            Ok(gate.test(self.observed))
+        })
+    }
+
+    /// The test of the refitted answer; `None` where no degree of freedom is left, or where simulations at the answer cannot be tested
+    /// (they diverge, say).
+    fn after(
         &self,
         simulator: &FeatureSimulator,
-        initial: &PointEstimate,
-    ) -> Result<(Stages, Option<Tracking>), EstimatorError> {
-        let information = self.information(simulator, &initial.theta)?;
+        theta: &[f64],
+        refined: &RefinedEstimate,
+        observed: &DVector<f64>,
+    ) -> Result<Option<GateOutcome>, EstimatorError> {
+        let simulator = &self.in_drawn_noise(simulator)?;
+        self.sure(simulator, "after", |test| {
+            match test.after_refit(theta, &refined.jacobian, observed) {
+                Err(EstimatorError::Hopeless { .. } | EstimatorError::Whitening(_)) => Ok(None),
+                outcome => outcome,
+            }
+        })
+    }
+
+    /// Tests; takes an answer near the level again, from more simulations.
+    fn sure<T: Copy + Into<Option<GateOutcome>>>(
+        &self,
+        simulator: &FeatureSimulator,
+        purpose: &str,
+        test: impl Fn(&GateTest<'_>) -> Result<T, EstimatorError>,
+    ) -> Result<T, EstimatorError> {
+        let settings = &self.settings.gate;
+        let first = test(&self.gate_test(simulator, settings, purpose))?;
+        match first.into() {
+            Some(outcome) if outcome.is_unsure() => {
+                let purpose = format!("{purpose}, larger");
+                test(&self.gate_test(simulator, &settings.larger(), &purpose))
+            }
+            _ => Ok(first),
+        }
+    }
+
+    fn gate_test<'a>(
+        &'a self,
+        simulator: &'a FeatureSimulator,
+        settings: &'a GateSettings,
+        purpose: &str,
+    ) -> GateTest<'a> {
+        GateTest {
+            simulator,
+            drive: self.record.drive(),
+            settings,
+            noise: self.noise.child(purpose),
+            progress: self.progress,
+        }
+    }
+
+    /// The simulator in noise drawn from the record's fit, where there is one.
+    fn in_drawn_noise(
+        &self,
+        simulator: &FeatureSimulator,
+    ) -> Result<FeatureSimulator, EstimatorError> {
+        Ok(match self.fit {
+            Some(fit) => simulator.of(&fit.drawn, None)?,
+            None => simulator.clone(),
+        })
+    }
+
+    /// Keeps the network's estimate.
+    fn keep(&self, initial: &PointEstimate) -> Result<(Stages, Option<Tracking>), EstimatorError> {
+        let refine = &self.settings.refine;
+        let refinement = self.refinement(self.simulator, self.observed, refine);
+        let information = match refinement.describe_at(&initial.theta) {
+            Ok(refined) => Some(refined.information),
+            Err(error @ EstimatorError::Cancelled(_)) => return Err(error),
+            // The features do not tell it.
+            Err(_) => None,
+        };
         // A free run may diverge where noisy runs do not; the estimate stands all the same.
-        let tracking = track(simulator.twin(), &initial.theta, self.record).ok();
-        Ok((Stages::Kept(KeptEstimate { information }), tracking))
+        let tracking = track(self.simulator.twin(), &initial.theta, self.record).ok();
+        Ok((Stages::Kept(information), tracking))
     }
 
     /// Refits the record, and follows it with what explains it better.
     fn refine(
         &self,
-        simulator: &FeatureSimulator,
         initial: &PointEstimate,
         steps: Steps,
     ) -> Result<(Stages, Option<Tracking>), EstimatorError> {
+        let simulator = self.simulator;
         let recipe = &*self.estimator.recipe;
         let bound = self.fit.map(|fit| simulator.of(&fit.twin, Some(recipe)));
         let bound = bound.transpose()?;
@@ -226,20 +313,6 @@ impl EstimateRun<'_> {
         };
         refit.tracking_initial = first;
         Ok((Stages::Refitted(Box::new(refit)), tracking))
-    }
-
-    /// Information of the record on θ at the network's estimate; `None` where the features do not tell it.
-    fn information(
-        &self,
-        simulator: &FeatureSimulator,
-        theta: &[f64],
-    ) -> Result<Option<FeatureInformation>, EstimatorError> {
-        let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
-        match refinement.describe_at(theta) {
-            Ok(refined) => Ok(Some(refined.information)),
-            Err(error @ EstimatorError::Cancelled(_)) => Err(error),
-            Err(_) => Ok(None),
-        }
     }
 }
 

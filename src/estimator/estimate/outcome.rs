@@ -1,11 +1,11 @@
 //! Options and results of an estimate.
 
+use super::refit::Contributions;
 use super::tracking::Tracking;
-use super::tune::Contributions;
 use crate::estimator::bank::Draws;
 use crate::estimator::gate::GateOutcome;
+use crate::estimator::project::PresetName;
 use crate::estimator::readout::Spread;
-use crate::estimator::recipe::PresetName;
 use crate::estimator::refine::FeatureInformation;
 use crate::fit::doubts::{DIVERGES, NO_BETTER};
 use crate::fit::{FittedNoise, Nuisance, Posterior, Warning};
@@ -60,17 +60,11 @@ impl PointEstimate {
 /// Stages after the gate at the network's estimate.
 #[derive(Debug, Clone)]
 pub(crate) enum Stages {
-    /// The prior is trusted and the gate agrees: the network's estimate is the answer.
-    Kept(KeptEstimate),
+    /// The prior is trusted and the gate agrees: the network's estimate is the answer. Holds the record's information there; `None`
+    /// where the features do not tell it.
+    Kept(Option<FeatureInformation>),
     /// The record was refitted.
     Refitted(Box<Refit>),
-}
-
-/// Description of the record's information at the network's estimate.
-#[derive(Debug, Clone)]
-pub(crate) struct KeptEstimate {
-    /// Information and directions; `None` where the features do not tell them.
-    pub(crate) information: Option<FeatureInformation>,
 }
 
 /// Refit of a record: Gauss–Newton, cloud, tuned heads, the test again.
@@ -181,7 +175,7 @@ impl Estimate {
     /// Information and directions at Gauss–Newton's estimate, or at the network's where the gate kept it.
     pub(crate) fn information(&self) -> Option<&FeatureInformation> {
         match &self.stages {
-            Stages::Kept(kept) => kept.information.as_ref(),
+            Stages::Kept(information) => information.as_ref(),
             Stages::Refitted(refit) => Some(&refit.information),
         }
     }

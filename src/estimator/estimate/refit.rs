@@ -2,18 +2,49 @@
 
 use super::EstimateRun;
 use super::outcome::{PointEstimate, Refit, RefitSeconds};
-use super::tune::{Tuning, tune};
-use crate::estimator::bank::FeatureSimulator;
-use crate::estimator::cloud::Cloud;
+use crate::estimator::bank::{Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
-use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
+use crate::estimator::readout::{
+    Calibration, QuadraticLayer, Readout, Scaler, Spread, Standardiser,
+};
 use crate::estimator::refine::{RefinedEstimate, Refinement};
 use crate::fit::posterior::PosteriorRegion;
+use crate::math::one_row;
+use crate::network::Training;
+use nalgebra::DVector;
+use ndarray::{Array2, Axis, s};
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
 
+/// Largest network input, in standard deviations of the cloud.
+const LIMIT: f64 = 8.0;
 /// The tuned estimate is kept within this quantile of χ²_d: of its squared distance from the record's posterior, or of its whitened misfit.
 const KEEP_TUNED: f64 = 0.999;
+
+/// Contributions of the quadratic layer and the heads to a tuned estimate, by parameter; measured on draws that neither saw.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Contributions {
+    /// α, the share of what the heads say that holds; the layer alone has 0.
+    pub alpha: Vec<f64>,
+    /// Share of the cloud's variance that the layer alone explains.
+    pub layer: Vec<f64>,
+    /// The same of layer and heads.
+    pub both: Vec<f64>,
+    /// The layer's estimate alone, within the bounds.
+    pub theta: Vec<f64>,
+}
+
+/// Heads tuned to one record.
+struct Tuned {
+    /// θ_fine, within the bounds.
+    theta: Vec<f64>,
+    /// Errors to expect, measured on a part of the cloud that the heads never saw.
+    spread: Option<Spread>,
+    /// `None` without a quadratic layer.
+    contributions: Option<Contributions>,
+}
 
 impl EstimateRun<'_> {
     /// Refits from the network's estimate; where the record's fit has a `region` and the features have a reference, about its mean.
@@ -23,16 +54,15 @@ impl EstimateRun<'_> {
         initial: &[f64],
         region: Option<&PosteriorRegion>,
     ) -> Result<Refit, EstimatorError> {
-        let (settings, progress) = (self.settings, self.progress);
         let lap = Instant::now();
         // Features with a reference are taken about the record's own θ from here on.
         let about = region.and_then(|region| Some((simulator.about(&region.theta)?, region)));
         let (simulator, initial, refine) = match &about {
             Some((simulator, region)) => {
-                let refine = settings.refine.centred();
+                let refine = self.settings.refine.centred();
                 (simulator, region.theta.as_slice(), refine)
             }
-            None => (simulator, initial, settings.refine.clone()),
+            None => (simulator, initial, self.settings.refine.clone()),
         };
         let observed = simulator.observe(self.record)?;
         let refinement = self.refinement(simulator, &observed, &refine);
@@ -40,25 +70,10 @@ impl EstimateRun<'_> {
         let gauss_newton = lap.elapsed().as_secs_f64();
         let lap = Instant::now();
         let region = about.as_ref().map(|(_, region)| *region);
-        let cloud = Cloud {
-            simulator,
-            drive: self.record.drive(),
-            refined: &refined,
-            region,
-            settings: &settings.cloud,
-        };
-        let draws = cloud.draw(self.noise.child("cloud"), progress)?;
+        let cloud = self.cloud(simulator, &refined, region)?;
         let cloud_seconds = lap.elapsed().as_secs_f64();
         let lap = Instant::now();
-        let tuned = tune(&Tuning {
-            estimator: self.estimator,
-            draws: &draws,
-            refined: &refined,
-            observed: &observed,
-            settings,
-            seed: self.seed,
-            progress,
-        })?;
+        let tuned = self.tune(&cloud, &refined, &observed)?;
         let seconds = RefitSeconds {
             gauss_newton,
             cloud: cloud_seconds,
@@ -81,10 +96,7 @@ impl EstimateRun<'_> {
         let space = simulator.twin().parameters();
         let answer = match tuned.spread {
             Some(spread) if keeps => PointEstimate::new(tuned.theta.clone(), spread, &space),
-            _ => {
-                let spread = Spread::normal(std_error, INTERVAL_LEVEL);
-                PointEstimate::new(instead.clone(), spread, &space)
-            }
+            _ => PointEstimate::new(instead.clone(), Spread::normal(std_error), &space),
         };
         Ok(Refit {
             after: self.after(simulator, &answer.theta, &refined, &observed)?,
@@ -95,8 +107,96 @@ impl EstimateRun<'_> {
             information: refined.information,
             is_refused: false,
             tracking_initial: None,
-            cloud: draws,
+            cloud,
             seconds,
+        })
+    }
+    /// Tunes the heads on a cloud, the trunk frozen, and reads the record's features with them.
+    ///
+    /// Each target's weight is w_j = d·G_jj/Σ G_kk, with G in the units that the targets are standardised in.
+    ///
+    /// Source: Lakshminarayanan, Guerrero & Rojas, section IV-C; the quadratic layer is ours.
+    fn tune(
+        &self,
+        draws: &Draws,
+        refined: &RefinedEstimate,
+        observed: &DVector<f64>,
+    ) -> Result<Tuned, EstimatorError> {
+        let (settings, estimator) = (self.settings, self.estimator);
+        let size = (settings.cloud.draws(draws.theta.ncols())).min(draws.theta.nrows());
+        let rows =
+            |all: &Array2<f64>, from: usize, to: usize| all.slice(s![from..to, ..]).to_owned();
+        let (features, theta) = (rows(&draws.features, 0, size), rows(&draws.theta, 0, size));
+        // On a cloud that is small against the prior, features and targets standardised as in pretraining are all but
+        // constant, and the heads learn little.
+        let (inputs, targets) = match settings.cloud.rescale {
+            true => {
+                let inputs = Standardiser::principal(&features, LIMIT);
+                let inputs = inputs.unwrap_or_else(|_| Standardiser::each(&features));
+                (inputs, Scaler::fit(&theta))
+            }
+            false => {
+                let Readout {
+                    inputs, targets, ..
+                } = &estimator.readout;
+                (inputs.clone(), targets.clone())
+            }
+        };
+        let (z, y) = (inputs.apply(&features), targets.apply(&theta));
+        let mut layer = match settings.cloud.quadratic {
+            true => QuadraticLayer::fit(&z, &y),
+            false => None,
+        };
+        let goal = match &layer {
+            Some(layer) => layer.rest(&z, &y),
+            None => y,
+        };
+        let training = Training {
+            target_weights: weights(refined, &targets),
+            ..settings.tuning.clone()
+        };
+        let (network, _) =
+            estimator
+                .readout
+                .network
+                .tune_heads(&z, &goal, &training, self.seed, self.progress)?;
+        let end = draws.theta.nrows();
+        let unseen = rows(&draws.features, size, end);
+        let truth = rows(&draws.theta, size, end);
+        if let Some(layer) = &mut layer {
+            let z = inputs.apply(&unseen);
+            let said = network.predict(&z)?;
+            layer.weigh(&layer.rest(&z, &targets.apply(&truth)), &said);
+        }
+        let readout = Readout {
+            inputs,
+            targets,
+            layer,
+            network,
+        };
+        let space = estimator.study().twin().parameters();
+        let record = one_row(observed.as_slice());
+        let theta = space.clamp(&readout.predict(&record)?.row(0).to_vec());
+        let calibration = Calibration {
+            predicted: readout.predict(&unseen)?,
+            truth,
+        };
+        let contributions = readout.layer.as_ref().map(|layer| {
+            let alone = |features| {
+                let z = readout.inputs.apply(features);
+                readout.targets.invert(&layer.quadratic.predict(&z))
+            };
+            Contributions {
+                alpha: layer.weight.clone(),
+                layer: explained(&alone(&unseen), &calibration.truth),
+                both: explained(&calibration.predicted, &calibration.truth),
+                theta: space.clamp(&alone(&record).row(0).to_vec()),
+            }
+        });
+        Ok(Tuned {
+            contributions,
+            spread: calibration.spread(&theta, &readout.targets.scale),
+            theta,
         })
     }
 }
@@ -112,4 +212,23 @@ fn keeps(refinement: &Refinement<'_>, refined: &RefinedEstimate, theta: &[f64]) 
 /// Returns whether a squared distance of this many degrees of freedom is one of chance.
 fn is_likely(square: f64, freedom: usize) -> bool {
     ChiSquared::new(freedom as f64).is_ok_and(|chi| square <= chi.inverse_cdf(KEEP_TUNED))
+}
+
+/// Share of each column's variance that a prediction explains.
+fn explained(predicted: &Array2<f64>, truth: &Array2<f64>) -> Vec<f64> {
+    let errors = (predicted - truth).mapv(|e| e * e).sum_axis(Axis(0));
+    let all = truth.var_axis(Axis(0), 0.0) * truth.nrows() as f64;
+    (errors.iter().zip(all))
+        .map(|(error, all)| 1.0 - error / all)
+        .collect()
+}
+
+/// w_j for standardised targets.
+fn weights(refined: &RefinedEstimate, targets: &Scaler) -> Vec<f64> {
+    let information: Vec<f64> = (targets.scale.iter().enumerate())
+        .map(|(j, scale)| refined.information.matrix[(j, j)] * scale * scale)
+        .collect();
+    let total: f64 = information.iter().sum();
+    let d = information.len() as f64;
+    information.iter().map(|g| d * g / total).collect()
 }

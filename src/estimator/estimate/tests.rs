@@ -24,7 +24,7 @@ fn record(study: &Study, twin: &Twin, theta: &[f64], noise: Noise) -> Record {
 }
 
 const SMALL: PretrainOptions = PretrainOptions {
-    preset: crate::estimator::recipe::PresetName::Default,
+    preset: crate::estimator::PresetName::Default,
     bank_size: Some(100),
     epochs: Some(1),
     seed: 1,

@@ -5,8 +5,8 @@
 
 use super::{GateForm, GateSettings, GateTest};
 use crate::estimator::bank::FeatureSimulator;
-use crate::estimator::refine::{RefineSettings, Refinement};
-use crate::estimator::{PresetName, Project};
+use crate::estimator::refine::Refinement;
+use crate::estimator::{PresetName, Project, RefineSettings};
 use crate::evaluate::paper::reference_projects;
 use crate::feature::{Ar, Arx, FeatureRecipe};
 use crate::math::binomial_bounds;

@@ -1,10 +1,380 @@
-//! Pretraining: a bank of simulations, and a network trained on it.
+//! Pretraining: a bank of simulations, and a network trained on it; it can be interrupted.
 
-mod resumable;
+use crate::estimator::bank::{Bank, Draws, Prior};
+use crate::estimator::error::EstimatorError;
+use crate::estimator::estimator::Estimator;
+use crate::estimator::project::{PresetName, Project};
+use crate::estimator::readout::{Calibration, Readout, Scaler, Standardiser};
+use crate::estimator::settings::{Inputs, Settings};
+use crate::estimator::shards::{BankPlan, ShardedBank};
+use crate::network::{Checkpoints, History, NetworkError, SamplePart, Samples};
+use crate::progress::Progress;
+use crate::storage::sweep_beside;
+use crate::storage::work::{Manifest, Share, WorkFolder};
+use ndarray::Array2;
+use serde_json::json;
+use std::borrow::Cow;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Simulations apart from the bank, on which the error of the network is measured.
+const CALIBRATION: usize = 1000;
+/// Rows that inputs and targets are standardised with.
+const STANDARD: usize = 20_000;
+/// Most simulations of a bank in memory.
+const MOST_IN_MEMORY: usize = 10_000_000;
+/// Largest network input, in standard deviations of the bank: far outside, the network should not extrapolate.
+const LIMIT: f64 = 6.0;
+/// Layout of the folder; raised when it changes.
+const LAYOUT: u32 = 1;
+const VERB: &str = "pretrain";
+/// Ending of the folder's name, after that of the estimator.
+const ENDING: &str = ".part";
+const BANK: &str = "bank";
+const TRAINING: &str = "training";
+/// Default time between two checkpoints: little is lost, and nobody waits for the disk.
+const CHECKPOINT: Duration = Duration::from_secs(10);
+
+/// Options of a pretraining.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PretrainOptions {
+    /// Recipe.
+    pub preset: PresetName,
+    /// Simulations to train on; the recipe's if `None`.
+    pub bank_size: Option<usize>,
+    /// Passes over the bank; the recipe's if `None`.
+    pub epochs: Option<usize>,
+    /// Seed of everything.
+    pub seed: u64,
+}
+
+/// Simulates a bank from the prior, in memory, and trains the network on it.
+///
+/// θ is uniform in the prior, each simulation has its own noise and, where the study draws inputs, its own input.
+/// Targets are standardised, which makes equal weights the paper's w_j = 1/Var(θ_j).
+///
+/// # Errors
+///
+/// [`EstimatorError`].
+///
+/// Source: Lakshminarayanan, Guerrero & Rojas, section III.
+pub fn pretrain(
+    project: impl Into<Project>,
+    options: &PretrainOptions,
+    progress: &Progress,
+) -> Result<(Estimator, History), EstimatorError> {
+    let project = &project.into();
+    let plan = PretrainPlan::new(project, *options)?;
+    let size = plan.size_in_memory()?;
+    let stage = progress.stage("bank", size);
+    let bank = (plan.prior).rows(0..size as u64, options.seed, "bank", &stage)?;
+    plan.train(&bank, &Checkpoints::none(), progress)
+}
+
+/// A pretraining whose settings are checked and whose features the network takes.
+struct PretrainPlan<'a> {
+    project: &'a Project,
+    options: PretrainOptions,
+    /// The preset's numbers with those that the options replace.
+    settings: Settings,
+    /// The prior through the preset's features.
+    prior: Prior,
+}
+
+impl<'a> PretrainPlan<'a> {
+    pub fn new(project: &'a Project, options: PretrainOptions) -> Result<Self, EstimatorError> {
+        let recipe = project.recipe(options.preset);
+        let mut settings = recipe.settings.clone();
+        settings.bank_size = options.bank_size.unwrap_or(settings.bank_size);
+        settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
+        settings.check()?;
+        let prior = Prior::new(project.study(), recipe.features.as_ref())?;
+        let most = recipe.architecture.max_features();
+        if prior.dim() > most {
+            return Err(EstimatorError::Inputs(format!(
+                "the features are {} numbers, network \"{}\" takes at most {most}; lower their order or choose a wider network",
+                prior.dim(),
+                recipe.architecture.id()
+            )));
+        }
+        Ok(Self {
+            project,
+            options,
+            settings,
+            prior,
+        })
+    }
+
+    /// Rows of the bank; refuses one that is too large for the memory.
+    pub fn size_in_memory(&self) -> Result<usize, EstimatorError> {
+        match self.settings.bank_size {
+            size if size <= MOST_IN_MEMORY => Ok(size),
+            size => Err(EstimatorError::TooLarge {
+                size,
+                most: MOST_IN_MEMORY,
+            }),
+        }
+    }
+
+    /// Trains the network on a bank of this study's prior and the preset's features; goes on with what was kept of the training.
+    ///
+    /// A bank of at most 64 MiB as 32-bit numbers gives, row for row, the estimator of [`pretrain`]; of a larger one, no more than
+    /// that is in memory at a time.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError`]; also for rows of another width.
+    pub fn train(
+        self,
+        bank: &dyn Bank,
+        checkpoints: &Checkpoints,
+        progress: &Progress,
+    ) -> Result<(Estimator, History), EstimatorError> {
+        let Self {
+            project,
+            options: PretrainOptions { preset, seed, .. },
+            settings,
+            prior,
+        } = self;
+        let recipe = project.recipe(preset);
+        let first = first_rows(bank)?;
+        let d = project.study().twin().parameters().len();
+        for (what, given, expected) in [
+            ("parameters", first.theta.ncols(), d),
+            ("features", first.features.ncols(), prior.dim()),
+        ] {
+            if given != expected {
+                return Err(EstimatorError::Bank(format!(
+                    "the bank has {given} {what}, twin and preset have {expected}; make a bank with this study and preset"
+                )));
+            }
+        }
+        let inputs = match settings.inputs {
+            Inputs::Each => Standardiser::each(&first.features),
+            Inputs::Principal => {
+                Standardiser::principal(&first.features, LIMIT).map_err(|error| {
+                    let problem =
+                        format!("the features of the bank cannot be standardised: {error}");
+                    EstimatorError::Inputs(problem)
+                })?
+            }
+        };
+        let targets = Scaler::fit(&first.theta);
+        let samples = Standardised {
+            bank,
+            inputs: &inputs,
+            targets: &targets,
+        };
+        let training = &settings.training;
+        let (network, history) =
+            (recipe.architecture).train_on(&samples, training, seed, checkpoints, progress)?;
+        let stage = progress.stage("calibration", CALIBRATION);
+        let Draws {
+            theta, features, ..
+        } = prior.rows(0..CALIBRATION as u64, seed, "calibration", &stage)?;
+        let mut estimator = Estimator {
+            project: project.clone(),
+            preset,
+            settings,
+            recipe: recipe.features.clone(),
+            architecture: recipe.architecture.clone(),
+            readout: Readout {
+                inputs,
+                targets,
+                layer: None,
+                network,
+            },
+            calibration: Calibration {
+                predicted: Array2::zeros(theta.dim()),
+                truth: theta,
+            },
+            seed,
+        };
+        estimator.calibration.predicted = estimator.predict(&features)?;
+        Ok((estimator, history))
+    }
+}
+
+/// The first [`STANDARD`] rows of a bank, or all: rows are alike, and so many tell means and deviations well enough.
+fn first_rows(bank: &dyn Bank) -> Result<Draws, EstimatorError> {
+    let sizes = bank.parts();
+    let rows = sizes.iter().sum::<usize>().min(STANDARD);
+    let parts = (0..sizes.len()).map(|index| bank.part(index));
+    Draws::stacked(rows, parts, |index| {
+        EstimatorError::Bank(format!(
+            "part {index} of the bank: another number of features; make the bank again"
+        ))
+    })
+}
+
+/// A bank as the network sees it.
+struct Standardised<'a> {
+    bank: &'a dyn Bank,
+    inputs: &'a Standardiser,
+    targets: &'a Scaler,
+}
+
+impl Samples for Standardised<'_> {
+    fn features(&self) -> usize {
+        self.inputs.mean.len()
+    }
+
+    fn targets(&self) -> usize {
+        self.targets.mean.len()
+    }
+
+    fn parts(&self) -> Vec<usize> {
+        self.bank.parts()
+    }
+
+    fn part(&self, index: usize) -> Result<SamplePart<'_>, Box<dyn Error + Send + Sync>> {
+        let draws = self.bank.part(index)?;
+        let features = self.inputs.apply(&draws.features);
+        let targets = self.targets.apply(&draws.theta);
+        Ok((Cow::Owned(features), Cow::Owned(targets)))
+    }
+}
+
+/// A pretraining whose work is kept beside the estimator's place until that is there.
+///
+/// The folder `EST.part` takes the bank, shard by shard, and the state of the training. Interrupted at any moment, the same
+/// pretraining goes on with it, and gives the bytes of one that nothing has disturbed, which are also those of
+/// [`pretrain`](pretrain()) and [`save`](Estimator::save).
+pub struct Pretraining {
+    /// Study and recipes.
+    pub project: Project,
+    /// Preset, sizes, seed.
+    pub options: PretrainOptions,
+    /// A bank that is there, with the checksum of its content; [`PretrainOptions::bank_size`] says nothing then.
+    pub bank: Option<(Box<dyn Bank>, String)>,
+    /// Time between two checkpoints of the training.
+    pub every: Duration,
+}
+
+impl Pretraining {
+    /// Creates a pretraining on simulations of its own, with a checkpoint each 10 s.
+    pub fn new(project: impl Into<Project>, options: PretrainOptions) -> Self {
+        Self {
+            project: project.into(),
+            options,
+            bank: None,
+            every: CHECKPOINT,
+        }
+    }
+
+    /// Pretrains, or goes on with it, and writes the estimator.
+    ///
+    /// An estimator that is there already is written again only where the folder of this very pretraining is still there: what
+    /// made it was interrupted before it had cleared up.
+    pub fn write(
+        &self,
+        path: &Path,
+        progress: &Progress,
+    ) -> Result<(Estimator, History), EstimatorError> {
+        let manifest = self.manifest()?;
+        let place = beside(path);
+        sweep_beside(path);
+        if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
+            let problem = "exists already; choose another name, or remove it";
+            return Err(EstimatorError::file(path, problem));
+        }
+        let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(()))?;
+        let lock = folder.lock()?;
+        let made = self.made(&folder, progress).and_then(|made| {
+            made.0.save_again(path)?;
+            Ok(made)
+        });
+        drop(lock);
+        match &made {
+            Ok(_) => folder.remove()?,
+            // It would only stand in the way of the next call. What is wrong is said, not that it cannot be removed either.
+            Err(error) if ends_for_good(error) || is_bare(&folder) => drop(folder.remove()),
+            Err(_) => {}
+        }
+        made
+    }
+
+    /// The estimator, by what is in the folder and what is still to be done.
+    fn made(
+        &self,
+        folder: &WorkFolder,
+        progress: &Progress,
+    ) -> Result<(Estimator, History), EstimatorError> {
+        let checkpoints = Checkpoints::new(folder.file(TRAINING), self.every);
+        // What the network cannot take is said before anything is simulated.
+        let plan = PretrainPlan::new(&self.project, self.sized())?;
+        let simulated;
+        let bank = match &self.bank {
+            Some((bank, _)) => &**bank,
+            None => {
+                let path = folder.file(BANK);
+                let bank = BankPlan {
+                    project: self.project.clone(),
+                    preset: self.options.preset,
+                    size: plan.size_in_memory()?,
+                    seed: self.options.seed,
+                };
+                bank.fill(&path, Share::WHOLE, progress)?;
+                // As one part: rows in the order in which they would be without a folder.
+                simulated = ShardedBank::open(&path)?.read()?;
+                &simulated
+            }
+        };
+        plan.train(bank, &checkpoints, progress)
+    }
+
+    /// The options, with the size of the bank that is given.
+    fn sized(&self) -> PretrainOptions {
+        let given = self.bank.as_ref().map(|(bank, _)| bank.rows());
+        PretrainOptions {
+            bank_size: given.or(self.options.bank_size),
+            ..self.options
+        }
+    }
+
+    /// Everything that the estimator depends on.
+    fn manifest(&self) -> Result<Manifest, EstimatorError> {
+        let preset = self.project.recipe(self.options.preset);
+        let settings = PretrainPlan::new(&self.project, self.sized())?.settings;
+        let bank = match &self.bank {
+            Some((_, checksum)) => checksum.clone(),
+            None => "simulated".into(),
+        };
+        let study = self.project.study();
+        Ok((study.manifest(VERB, LAYOUT)?)
+            .with("features", json!(preset.features))
+            .with("network", preset.architecture.id())
+            .with("settings", json!(settings))
+            .with("bank", bank)
+            .with("seed", self.options.seed))
+    }
+}
+
+/// Returns whether the same call would end with the same error again.
+fn ends_for_good(error: &EstimatorError) -> bool {
+    matches!(
+        error,
+        EstimatorError::Setting(_)
+            | EstimatorError::Study(_)
+            | EstimatorError::Feature(_)
+            | EstimatorError::Inputs(_)
+            | EstimatorError::Undetermined(_)
+            | EstimatorError::Network(NetworkError::Diverged { .. })
+    )
+}
+
+/// Returns whether nothing is kept in the folder yet.
+fn is_bare(folder: &WorkFolder) -> bool {
+    !folder.file(TRAINING).exists() && !ShardedBank::is_begun(&folder.file(BANK))
+}
+
+/// Where the work on the estimator at `path` is kept.
+fn beside(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ENDING);
+    name.into()
+}
+
 #[cfg(test)]
 mod tests;
-mod train;
-
-pub(crate) use resumable::GivenBank;
-pub use resumable::Pretraining;
-pub use train::{PretrainOptions, pretrain};

@@ -1,7 +1,6 @@
 //! Training on a bank on disk.
 
-use super::train::PretrainPlan;
-use super::{PretrainOptions, pretrain};
+use super::{PretrainOptions, PretrainPlan, pretrain};
 use crate::estimator::bank::{Bank, Draws};
 use crate::estimator::shards::ShardedBank;
 use crate::estimator::shards::tests::{fill, oscillator, plan};

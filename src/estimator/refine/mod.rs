@@ -12,24 +12,20 @@
 //! ecological dynamic systems", Nature 466 (2010), for the synthetic likelihood.
 
 mod information;
-mod problem;
-mod settings;
-#[cfg(test)]
-mod tests;
 
 pub(crate) use information::FeatureInformation;
-pub use settings::RefineSettings;
 
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
-use crate::estimator::gate::GateSettings;
-use crate::fit::least_squares::{GaussNewton, ResidualProblem, space_filling};
-use crate::math::{MathError, Whitening};
+use crate::estimator::gate::whiten;
+use crate::estimator::settings::{GateSettings, RefineSettings};
+use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem, space_filling};
+use crate::math::{MathError, Stencil, Whitening};
 use crate::progress::{Progress, Stage};
 use crate::record::Drive;
-use crate::twin::Noise;
+use crate::twin::{Interval, Noise};
 use nalgebra::{DMatrix, DVector};
-use problem::FeatureResidual;
+use rayon::prelude::*;
 
 /// Largest move, in prior widths, of an estimate that rests.
 const AT_REST: f64 = 1e-3;
@@ -92,18 +88,9 @@ pub struct Refinement<'a> {
     pub progress: &'a Progress,
 }
 
-debug_by_name!(Refinement<'_>);
-
-/// Where one start has come to.
-struct StartEnd {
-    theta: DVector<f64>,
-    local: Local,
-    score: f64,
-}
-
-/// Features simulated at one θ.
-#[derive(Clone)]
+/// A θ, and the features simulated there.
 struct Local {
+    theta: DVector<f64>,
     whitening: Whitening,
     spread: Vec<f64>,
 }
@@ -114,24 +101,22 @@ impl Refinement<'_> {
         let settings = self.settings;
         let steps = settings.starts + settings.rounds;
         let stage = self.progress.stage("Gauss–Newton", steps);
-        let mut problem = self.problem(initial, settings.seeds);
-        let start = problem.initial.clone();
-        let (theta, local) = match (settings.starts, settings.rounds) {
+        let features = self.mean_features(initial, settings.seeds)?;
+        let local = match (settings.starts, settings.rounds) {
             // Nothing to choose from, and little way to go.
-            (1, 1) => (start.clone(), self.whiten(&start)?),
-            _ => self.survey(&start, &stage)?,
+            (1, 1) => self.whiten(features.initial.clone())?,
+            _ => self.survey(initial, &stage)?,
         };
-        let (theta, local) = self.polish(&mut problem, theta, local, &stage)?;
+        let local = self.polish(&features, local, &stage)?;
         stage.finish();
-        self.describe(&problem, theta, local)
+        self.describe(&features, local)
     }
 
     /// Returns information and directions at `theta` without a search.
     pub fn describe_at(&self, theta: &[f64]) -> Result<RefinedEstimate, EstimatorError> {
-        let problem = self.problem(theta, self.settings.seeds);
-        let theta = problem.initial.clone();
-        let local = self.whiten(&theta)?;
-        self.describe(&problem, theta, local)
+        let features = self.mean_features(theta, self.settings.seeds)?;
+        let local = self.whiten(features.initial.clone())?;
+        self.describe(&features, local)
     }
 
     /// S^{-1/2}(f̄(θ) − x_obs) with the covariance at θ_GN.
@@ -140,47 +125,41 @@ impl Refinement<'_> {
         refined: &RefinedEstimate,
         theta: &[f64],
     ) -> Result<DVector<f64>, EstimatorError> {
-        let problem = self.problem(refined.theta.as_slice(), self.settings.seeds);
-        let mean = problem
-            .mean_features(&DVector::from_column_slice(theta))
-            .map_err(not_evaluated)?;
+        let features = self.mean_features(refined.theta.as_slice(), self.settings.seeds)?;
+        let mean = features.at(theta).map_err(not_evaluated)?;
         Ok(refined.whitening.apply(&(mean - self.observed)))
     }
 
     /// ∂f/∂θ at `theta`, n × d, of a few seeds, each by itself.
     pub fn jacobians_at(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, EstimatorError> {
-        let problem = self.problem(theta, self.settings.centred_seeds);
-        Ok((problem.jacobians(&problem.initial)).map_err(not_evaluated)?)
+        let features = self.mean_features(theta, self.settings.centred_seeds)?;
+        Ok((features.jacobians(&features.initial)).map_err(not_evaluated)?)
     }
 
-    /// The residual that is pulled towards `initial`, with so many runs in each mean.
-    fn problem(&self, initial: &[f64], seeds: usize) -> FeatureResidual<'_> {
+    /// f̄ of so many runs, beside θ_init.
+    fn mean_features(&self, initial: &[f64], seeds: usize) -> Result<MeanFeatures<'_>, MathError> {
         let space = self.simulator.twin().parameters();
-        let (widths, bounds) = (space.widths(), space.bounds());
-        FeatureResidual {
+        let side = |end: fn(Interval) -> f64| {
+            DVector::from_iterator(space.len(), space.iter().map(|p| end(p.bounds)))
+        };
+        Ok(MeanFeatures {
             refinement: self,
             seeds,
-            whitening: None,
             initial: DVector::from_vec(space.clamp(initial)),
-            lower: bounds.iter().map(|b| b.low()).collect(),
-            upper: bounds.iter().map(|b| b.high()).collect(),
-            widths: DVector::from_vec(widths),
-        }
+            widths: DVector::from_vec(space.widths()),
+            bounds: Bounds::new(side(Interval::low), side(Interval::high))?,
+        })
     }
 
     /// The best of several starts: θ_init, then space-filling points in the bounds.
-    fn survey(
-        &self,
-        initial: &DVector<f64>,
-        stage: &Stage,
-    ) -> Result<(DVector<f64>, Local), EstimatorError> {
-        let mut problem = self.problem(initial.as_slice(), self.settings.survey_seeds);
-        let others = space_filling(&problem.bounds()?, self.settings.starts - 1, 0);
-        let (mut best, mut last): (Option<StartEnd>, _) = (None, String::new());
-        for start in [initial.clone()].into_iter().chain(others) {
-            match self.climb(&mut problem, &start) {
+    fn survey(&self, initial: &[f64], stage: &Stage) -> Result<Local, EstimatorError> {
+        let features = self.mean_features(initial, self.settings.survey_seeds)?;
+        let others = space_filling(&features.bounds, self.settings.starts - 1, 0);
+        let (mut best, mut last): (Option<(f64, Local)>, _) = (None, String::new());
+        for start in [features.initial.clone()].into_iter().chain(others) {
+            match self.climb(&features, start) {
                 // Ties and equals go to the earlier start: θ_init comes first.
-                Ok(found) if best.as_ref().is_none_or(|best| found.score > best.score) => {
+                Ok(found) if best.as_ref().is_none_or(|best| found.0 > best.0) => {
                     best = Some(found);
                 }
                 Ok(_) => {}
@@ -190,61 +169,53 @@ impl Refinement<'_> {
             stage.tick()?;
         }
         let starts = self.settings.starts;
-        let StartEnd { theta, local, .. } = best.ok_or_else(|| {
+        best.map(|(_, local)| local).ok_or_else(|| {
             EstimatorError::Undetermined(format!(
                 "Gauss–Newton found no estimate from {starts} starts: {last}; widen the bounds or check the twin"
             ))
-        })?;
-        Ok((theta, local))
+        })
     }
 
     /// One start: whiten there, descend, whiten at the end, score.
     fn climb(
         &self,
-        problem: &mut FeatureResidual<'_>,
-        start: &DVector<f64>,
-    ) -> Result<StartEnd, EstimatorError> {
-        problem.whitening = Some(self.whiten(start)?.whitening);
-        let theta = self.descend(problem, start)?;
-        let local = self.whiten(&theta)?;
-        problem.whitening = Some(local.whitening.clone());
-        let residual = problem.residual(&theta).map_err(not_evaluated)?;
-        Ok(StartEnd {
-            score: -0.5 * (residual.norm_squared() + local.whitening.log_determinant()),
-            theta,
-            local,
-        })
+        features: &MeanFeatures<'_>,
+        start: DVector<f64>,
+    ) -> Result<(f64, Local), EstimatorError> {
+        let local = self.whiten(start)?;
+        let local = self.whiten(self.descend(features, &local)?)?;
+        let residual = features.whitened(&local.whitening).residual(&local.theta);
+        let square = residual.map_err(not_evaluated)?.norm_squared();
+        Ok((-0.5 * (square + local.whitening.log_determinant()), local))
     }
 
     /// Descends on from the best start with all seeds, simulating S again until θ rests.
     fn polish(
         &self,
-        problem: &mut FeatureResidual<'_>,
-        mut theta: DVector<f64>,
+        features: &MeanFeatures<'_>,
         mut local: Local,
         stage: &Stage,
-    ) -> Result<(DVector<f64>, Local), EstimatorError> {
+    ) -> Result<Local, EstimatorError> {
         for _ in 0..self.settings.rounds {
-            problem.whitening = Some(local.whitening.clone());
-            let next = self.descend(problem, &theta)?;
-            let moved = (&next - &theta).component_div(&problem.widths).amax();
-            theta = next;
+            let theta = self.descend(features, &local)?;
+            let moved = (&theta - &local.theta).component_div(&features.widths);
             // A single round stays so near that S does.
-            if self.settings.rounds > 1 {
-                local = self.whiten(&theta)?;
-            }
+            local = match self.settings.rounds {
+                1 => Local { theta, ..local },
+                _ => self.whiten(theta)?,
+            };
             stage.tick()?;
-            if moved < AT_REST {
+            if moved.amax() < AT_REST {
                 break;
             }
         }
-        Ok((theta, local))
+        Ok(local)
     }
 
     fn descend(
         &self,
-        problem: &FeatureResidual<'_>,
-        start: &DVector<f64>,
+        features: &MeanFeatures<'_>,
+        from: &Local,
     ) -> Result<DVector<f64>, MathError> {
         let search = GaussNewton {
             max_iterations: self.settings.iterations,
@@ -254,33 +225,41 @@ impl Refinement<'_> {
             // A step over half the prior's width leaves what the Jacobian knows.
             max_step: Some(0.5),
         };
-        let bounds = problem.bounds()?;
-        Ok((search.minimise(problem, start, &bounds, &problem.widths)?).theta)
+        let problem = features.whitened(&from.whitening);
+        let end = search.minimise(&problem, &from.theta, &features.bounds, &features.widths)?;
+        Ok(end.theta)
     }
 
     /// S at `theta`, from the same noise everywhere.
-    fn whiten(&self, theta: &DVector<f64>) -> Result<Local, EstimatorError> {
+    fn whiten(&self, theta: DVector<f64>) -> Result<Local, EstimatorError> {
         let size = self.gate.whitening_simulations(self.simulator.dim());
         let noise = self.noise.child("whitening");
         let stage = self.progress.unshown().stage("whitening", 0);
         let sample = |i| noise.sample(i);
         let features =
             (self.simulator).repeat(theta.as_slice(), self.drive, size, sample, &stage)?;
-        let whitening = self.gate.whiten(&features)?;
+        let whitening = whiten(self.gate, &features)?;
         let squares = whitening.squared_distances(&features);
-        let spread = squares.iter().map(|s| s.sqrt()).collect();
-        Ok(Local { whitening, spread })
+        Ok(Local {
+            theta,
+            whitening,
+            spread: squares.iter().map(|s| s.sqrt()).collect(),
+        })
     }
 
     /// Everything around the estimate.
     fn describe(
         &self,
-        problem: &FeatureResidual<'_>,
-        theta: DVector<f64>,
-        Local { whitening, spread }: Local,
+        features: &MeanFeatures<'_>,
+        local: Local,
     ) -> Result<RefinedEstimate, EstimatorError> {
-        let jacobian = problem.feature_jacobian(&theta).map_err(not_evaluated)?;
-        let mean = problem.mean_features(&theta).map_err(not_evaluated)?;
+        let Local {
+            theta,
+            whitening,
+            spread,
+        } = local;
+        let jacobian = features.jacobian(&theta).map_err(not_evaluated)?;
+        let mean = features.at(theta.as_slice()).map_err(not_evaluated)?;
         let residual = whitening.apply(&(mean - self.observed));
         let information = FeatureInformation::new(
             &whitening.apply_columns(&jacobian),
@@ -307,3 +286,128 @@ fn not_evaluated(error: MathError) -> MathError {
         other => MathError::fatal(other),
     }
 }
+
+impl From<EstimatorError> for MathError {
+    fn from(error: EstimatorError) -> Self {
+        match error {
+            EstimatorError::Rejected(reason) => Self::rejected(reason),
+            error => Self::fatal(error),
+        }
+    }
+}
+
+/// f̄(θ), the mean of the features over runs of fixed seeds, and its derivatives by paired differences.
+struct MeanFeatures<'a> {
+    refinement: &'a Refinement<'a>,
+    /// Runs that f̄ averages.
+    seeds: usize,
+    /// θ_init.
+    initial: DVector<f64>,
+    /// Widths of the prior.
+    widths: DVector<f64>,
+    bounds: Bounds,
+}
+
+impl MeanFeatures<'_> {
+    fn noise(&self, seed: u64) -> Noise {
+        self.refinement.noise.child("mean features").sample(seed)
+    }
+
+    /// f̄(θ).
+    fn at(&self, theta: &[f64]) -> Result<DVector<f64>, MathError> {
+        let &Refinement {
+            simulator,
+            drive,
+            progress,
+            ..
+        } = self.refinement;
+        progress.checkpoint().map_err(MathError::fatal)?;
+        Ok(simulator.mean_features(theta, drive, |seed| self.noise(seed), self.seeds)?)
+    }
+
+    fn stencil(&self, theta: &DVector<f64>) -> Result<Stencil, MathError> {
+        let steps = &self.widths * self.refinement.settings.step;
+        let [lower, upper] = [self.bounds.lower(), self.bounds.upper()].map(DVector::as_slice);
+        Stencil::new(theta.as_slice(), steps.as_slice(), lower, upper)
+    }
+
+    /// ∂f/∂θ of each seed by itself.
+    fn jacobians(&self, theta: &DVector<f64>) -> Result<Vec<DMatrix<f64>>, MathError> {
+        let stencil = self.stencil(theta)?;
+        let &Refinement {
+            simulator,
+            drive,
+            progress,
+            ..
+        } = self.refinement;
+        let one = |seed: u64| {
+            progress.checkpoint().map_err(MathError::fatal)?;
+            let all: Vec<_> = (stencil.points().iter())
+                .map(|point| (&point[..], drive, self.noise(seed)))
+                .collect();
+            let values: Vec<DVector<f64>> = (simulator.features(&all).into_iter())
+                .map(|features| Ok(DVector::from_vec(features?)))
+                .collect::<Result<_, EstimatorError>>()?;
+            Ok(stencil.assemble(&values))
+        };
+        (0..self.seeds as u64).into_par_iter().map(one).collect()
+    }
+
+    /// ∂f̄/∂θ: the same seeds on both sides of θ.
+    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
+        let stencil = self.stencil(theta)?;
+        let values: Vec<DVector<f64>> = (stencil.points().par_iter())
+            .map(|point| self.at(point))
+            .collect::<Result<_, _>>()?;
+        Ok(stencil.assemble(&values))
+    }
+
+    fn whitened<'a>(&'a self, whitening: &'a Whitening) -> FeatureResidual<'a> {
+        let features = self;
+        FeatureResidual {
+            features,
+            whitening,
+        }
+    }
+
+    /// √γ.
+    fn pull(&self) -> f64 {
+        self.refinement.settings.pull.sqrt()
+    }
+}
+
+/// r(θ) = [ S^{-1/2}(f̄(θ) − x_obs) ;  √γ·(θ − θ_init)/width ].
+struct FeatureResidual<'a> {
+    features: &'a MeanFeatures<'a>,
+    whitening: &'a Whitening,
+}
+
+impl ResidualProblem for FeatureResidual<'_> {
+    fn dimension(&self) -> usize {
+        self.features.initial.len()
+    }
+
+    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
+        let features = self.features;
+        let mean = features.at(theta.as_slice())?;
+        let misfit = self.whitening.apply(&(mean - features.refinement.observed));
+        let off = (theta - &features.initial).component_div(&features.widths);
+        let prior = off * features.pull();
+        let rows = misfit.iter().chain(prior.iter()).copied();
+        Ok(DVector::from_iterator(misfit.len() + prior.len(), rows))
+    }
+
+    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
+        let jacobian = self.features.jacobian(theta)?;
+        let whitened = self.whitening.apply_columns(&jacobian);
+        let (n, d) = whitened.shape();
+        let mut all = whitened.resize_vertically(n + d, 0.0);
+        for j in 0..d {
+            all[(n + j, j)] = self.features.pull() / self.features.widths[j];
+        }
+        Ok(all)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,8 +1,8 @@
 //! The refinement finds the parameter of a record.
 
 use super::{RefineSettings, Refinement};
+use crate::estimator::GateSettings;
 use crate::estimator::bank::FeatureSimulator;
-use crate::estimator::gate::GateSettings;
 use crate::feature::Ar;
 use crate::progress::Progress;
 use crate::record::{Drive, Record};

@@ -29,7 +29,7 @@ const AGAIN: &str = "make the same bank again, and it is replaced";
 #[derive(Debug, Clone)]
 pub(super) struct Shards {
     folder: WorkFolder,
-    manifest: Manifest,
+    pub manifest: Manifest,
     /// Simulations of the whole bank.
     pub size: usize,
     rows: usize,
@@ -70,15 +70,13 @@ impl Shards {
             let name = |p: &Value| p["name"].as_str().map(str::to_owned);
             all.iter().map(name).collect::<Option<Vec<String>>>()
         });
-        let (Some(size), Some(rows), Some(names)) =
-            (number("size"), number("rows of a shard"), names)
-        else {
+        // Everything below counts shards: no manifest may make it count without end.
+        let size = number("size").filter(|size| *size <= MOST_SIMULATIONS);
+        let rows = size.map(rows_of_a_shard);
+        let rows = rows.filter(|rows| number("rows of a shard") == Some(*rows));
+        let (Some(size), Some(rows), Some(names)) = (size, rows, names) else {
             return Err(foreign(folder.path()).into());
         };
-        // Everything below counts shards: no manifest may make it count without end.
-        if size > MOST_SIMULATIONS || rows != rows_of_a_shard(size) {
-            return Err(foreign(folder.path()).into());
-        }
         let of = size.div_ceil(rows);
         let place = folder.part(SHARDS)?;
         let mut there = BTreeMap::new();
@@ -209,18 +207,12 @@ impl Shards {
         }
         Ok(())
     }
-
-    /// The folder's manifest.
-    pub fn manifest(&self) -> &Manifest {
-        &self.manifest
-    }
 }
 
 /// Returns the error of a folder whose manifest is incomplete.
 fn foreign(path: &Path) -> StorageError {
-    let path = path.into();
     StorageError::Foreign {
-        path,
+        path: path.into(),
         verb: VERB,
         reason: "its manifest.json is damaged".into(),
     }
@@ -298,7 +290,7 @@ impl ShardedBank {
     }
 
     pub(super) fn manifest(&self) -> &Manifest {
-        self.shards.manifest()
+        &self.shards.manifest
     }
 }
 

@@ -113,7 +113,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimator::{KeptEstimate, Stages};
+    use crate::estimator::Stages;
     use crate::report::fixture::{estimates, validator};
 
     fn checked(estimate: &Estimate) -> Value {
@@ -195,7 +195,7 @@ mod tests {
         assert_eq!(value["nuisance"][0]["std_error"], Value::Null);
         assert_eq!(value["free_run"]["rmse"], Value::Null);
         let mut estimate = estimates().kept.clone();
-        estimate.stages = Stages::Kept(KeptEstimate { information: None });
+        estimate.stages = Stages::Kept(None);
         let value = checked(&estimate);
         assert_eq!(
             (&value["weak_directions"], &value["directions"]),

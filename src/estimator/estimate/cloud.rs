@@ -1,19 +1,18 @@
 //! The cloud of fresh simulations around an estimate, which the heads are tuned on.
 //!
-//! Another sampler is a function here, its variant of [`CloudSampler`] and its arm in [`CloudSampler::around`].
+//! Another sampler is a function here, its variant of [`CloudSampler`] and its arm in [`sampler`].
 //!
 //! Source of all but the box: Lakshminarayanan, Guerrero & Rojas, section IV-B.
 
+use super::EstimateRun;
 use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::RefinedEstimate;
+use crate::estimator::settings::CloudSampler;
 use crate::fit::posterior::PosteriorRegion;
 use crate::math::{median, principal_axes};
-use crate::progress::Progress;
-use crate::record::Drive;
 use crate::twin::{Interval, Noise, Parameter, ParameterSpace};
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// Half-width of the box, in standard deviations of a cloud of spread 1.
@@ -25,109 +24,44 @@ const REDRAWS: usize = 10;
 const CALIBRATION_SHARE: usize = 5;
 const CALIBRATION: usize = 200;
 
-/// Settings of the cloud.
-///
-/// | field | default | range | meaning |
-/// |---|---|---|---|
-/// | `size` | 1000 | ≥ 10 | simulations M_FT, at most |
-/// | `per_parameter` | 400 | ≥ 10 | simulations for each parameter, if that is fewer; not in the paper |
-/// | `sampler` | ellipsoid | | see [`CloudSampler`] |
-/// | `spread` | 2 | > 0 | standard deviations of the ellipsoid over those of the estimate; 1 in the paper |
-/// | `quadratic` | true | | a quadratic layer beside the tuned heads; not in the paper |
-/// | `rescale` | true | | standardise features and targets anew on the cloud; not in the paper |
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CloudSettings {
-    /// Largest number of simulations.
-    pub size: usize,
-    /// Simulations for each parameter.
-    pub per_parameter: usize,
-    /// Where they are drawn.
-    pub sampler: CloudSampler,
-    /// Scale of the ellipsoid.
-    pub spread: f64,
-    /// `true` if features and targets are standardised anew on the cloud.
-    pub rescale: bool,
-    /// `true` if a quadratic layer stands beside the tuned heads.
-    pub quadratic: bool,
-}
-
-impl Default for CloudSettings {
-    fn default() -> Self {
-        Self {
-            size: 1000,
-            per_parameter: 400,
-            sampler: CloudSampler::Ellipsoid,
-            spread: 2.0,
-            rescale: true,
-            quadratic: true,
-        }
-    }
-}
-
-impl CloudSettings {
-    /// M_FT for `parameters` parameters.
-    pub fn draws(&self, parameters: usize) -> usize {
-        self.size.min(self.per_parameter.saturating_mul(parameters))
-    }
-}
-
-/// Sampler of the cloud.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum CloudSampler {
-    /// The confidence ellipsoid alone.
-    #[default]
-    Ellipsoid,
-    /// Along sensitivities alone.
-    Sensitivity,
-    /// The paper's alternation of both.
-    Hybrid,
-    /// Uniform in the box of the principal axes, ±1.8·`spread` standard deviations: flat over the region.
-    Box,
-}
-
 /// Draws parameters around an estimate: draw number i depends on i and on its noise alone. Bounds are ignored: the cloud rejects
 /// draws outside, draws again with other noise, and counts them.
 type Sampler = Box<dyn Fn(u64, Noise) -> DVector<f64> + Send + Sync>;
 
-impl CloudSampler {
-    /// This sampler around an estimate, `spread` times as wide as its covariance says.
-    fn around(
-        self,
-        refined: &RefinedEstimate,
-        space: &ParameterSpace,
-        spread: f64,
-    ) -> Result<Sampler, EstimatorError> {
-        let centre = &refined.theta;
-        let ellipsoid = || ellipsoid(centre, &refined.information.matrix / spread.powi(2));
-        let sensitivity = || {
-            let jacobian = refined.whitened_jacobian();
-            let length = median(&refined.spread).unwrap_or(1.0) * refined.residual.norm();
-            let radius = |(j, p): (usize, &Parameter)| {
-                // An insensitive parameter gives an infinite radius.
-                let sensitivity = jacobian.column(j).norm().max(f64::MIN_POSITIVE);
-                (length / sensitivity).min(0.5 * p.start_range().width())
-            };
-            sensitivity(centre, space.iter().enumerate().map(radius).collect())
+/// The sampler of this kind around an estimate, `spread` times as wide as its covariance says.
+fn sampler(
+    kind: CloudSampler,
+    refined: &RefinedEstimate,
+    space: &ParameterSpace,
+    spread: f64,
+) -> Result<Sampler, EstimatorError> {
+    let centre = &refined.theta;
+    let ellipsoid = || ellipsoid(centre, &refined.information.matrix / spread.powi(2));
+    let sensitivity = || {
+        let jacobian = refined.whitened_jacobian();
+        let length = median(&refined.spread).unwrap_or(1.0) * refined.residual.norm();
+        let radius = |(j, p): (usize, &Parameter)| {
+            // An insensitive parameter gives an infinite radius.
+            let sensitivity = jacobian.column(j).norm().max(f64::MIN_POSITIVE);
+            (length / sensitivity).min(0.5 * p.start_range().width())
         };
-        Ok(match self {
-            Self::Ellipsoid => ellipsoid()?,
-            Self::Sensitivity => sensitivity(),
-            Self::Box => {
-                let axes = principal_axes(refined.information.covariance.clone());
-                in_box(centre.as_slice(), &axes, spread)
-            }
-            Self::Hybrid => {
-                let (even, odd) = (ellipsoid()?, sensitivity());
-                Box::new(move |index, noise| match index.is_multiple_of(2) {
-                    true => even(index, noise),
-                    false => odd(index, noise),
-                })
-            }
-        })
-    }
+        sensitivity(centre, space.iter().enumerate().map(radius).collect())
+    };
+    Ok(match kind {
+        CloudSampler::Ellipsoid => ellipsoid()?,
+        CloudSampler::Sensitivity => sensitivity(),
+        CloudSampler::Box => {
+            let axes = principal_axes(refined.information.covariance.clone());
+            in_box(centre.as_slice(), &axes, spread)
+        }
+        CloudSampler::Hybrid => {
+            let (even, odd) = (ellipsoid()?, sensitivity());
+            Box::new(move |index, noise| match index.is_multiple_of(2) {
+                true => even(index, noise),
+                false => odd(index, noise),
+            })
+        }
+    })
 }
 
 /// Gaussian draws whose covariance is the inverse of an information matrix G = L Lᵀ (d × d, inverse square units):
@@ -186,33 +120,24 @@ fn in_box(centre: &[f64], axes: &DMatrix<f64>, spread: f64) -> Sampler {
     })
 }
 
-/// Where a cloud is drawn.
-pub struct Cloud<'a> {
-    /// Twin and features.
-    pub simulator: &'a FeatureSimulator,
-    /// The record's input.
-    pub drive: &'a Drive,
-    /// Gauss–Newton's estimate.
-    pub refined: &'a RefinedEstimate,
-    /// Where the record puts θ, if the features are about its mean.
-    pub region: Option<&'a PosteriorRegion>,
-    /// Settings.
-    pub settings: &'a CloudSettings,
-}
-
-impl Cloud<'_> {
-    /// Simulates M_FT draws around the estimate under the record's own input, and some more for calibration; row i depends on the seed
-    /// and i alone.
-    pub fn draw(&self, noise: Noise, progress: &Progress) -> Result<Draws, EstimatorError> {
-        let space = self.simulator.twin().parameters();
-        let spread = self.settings.spread;
-        let sampler = match self.region {
+impl EstimateRun<'_> {
+    /// Simulates M_FT draws around Gauss–Newton's estimate, or in the region where the record puts θ, under the record's own input, and some
+    /// more for calibration; row i depends on the seed and i alone.
+    pub(super) fn cloud(
+        &self,
+        simulator: &FeatureSimulator,
+        refined: &RefinedEstimate,
+        region: Option<&PosteriorRegion>,
+    ) -> Result<Draws, EstimatorError> {
+        let settings = &self.settings.cloud;
+        let (space, spread) = (simulator.twin().parameters(), settings.spread);
+        let sampler = match region {
             Some(region) => in_box(&region.theta, &region.axes, spread),
-            None => (self.settings.sampler).around(self.refined, &space, spread)?,
+            None => sampler(settings.sampler, refined, &space, spread)?,
         };
-        let size = self.settings.draws(space.len());
+        let size = settings.draws(space.len());
         let size = size + (size / CALIBRATION_SHARE).max(CALIBRATION);
-        let stage = progress.stage("cloud", size);
+        let stage = self.progress.stage("cloud", size);
         let draw = |i, attempt, noise| {
             let mut theta = sampler(i, noise).as_slice().to_vec();
             if attempt >= REDRAWS {
@@ -220,11 +145,11 @@ impl Cloud<'_> {
             }
             Ok(space.check_point(&theta).is_ok().then_some(Draw {
                 theta,
-                drive: Cow::Borrowed(self.drive),
+                drive: Cow::Borrowed(self.record.drive()),
             }))
         };
-        let rows = 0..size as u64;
-        (self.simulator).draws(rows, |i| noise.sample(i), draw, &stage)
+        let noise = self.noise.child("cloud");
+        simulator.draws(0..size as u64, |i| noise.sample(i), draw, &stage)
     }
 }
 
