@@ -6,7 +6,7 @@
 use crate::Clock;
 use ndarray::Array2;
 use std::hint::black_box;
-use truetwin::network::untyped::{Checkpoints, architecture};
+use truetwin::network::untyped::{Checkpoints, Samples, architecture};
 use truetwin::network::{Deep, Training, layers::*};
 use truetwin::progress::Progress;
 
@@ -52,7 +52,7 @@ fn training(clock: &Clock) {
     ] {
         let silent = Progress::silent();
         clock.time(&format!("network: one epoch, {name}"), 1, || {
-            let samples = (&features, &targets);
+            let samples = Samples::in_memory(&features, &targets);
             deep.train_on(&samples, &settings(), 1, &Checkpoints::none(), &silent)
         });
     }
@@ -61,14 +61,9 @@ fn training(clock: &Clock) {
 fn tuning(clock: &Clock) {
     let (features, targets) = samples(1000);
     let silent = Progress::silent();
+    let samples = Samples::in_memory(&features, &targets);
     let (network, _) = architecture::<Deep>()
-        .train_on(
-            &(&features, &targets),
-            &settings(),
-            1,
-            &Checkpoints::none(),
-            &silent,
-        )
+        .train_on(&samples, &settings(), 1, &Checkpoints::none(), &silent)
         .expect("the samples are finite");
     clock.time("network: one epoch of heads, 1000 samples", 1, || {
         network.tune_heads(&features, &targets, &settings(), 1, &silent)

@@ -162,7 +162,7 @@ impl Remedy for EstimatorError {
             Self::Study(error) => error.cause(),
             Self::Feature(error) => error.cause(),
             Self::Network(error) => error.cause(),
-            Self::Cancelled(_) | Self::Search(_) | Self::Cloud(_) => Cause::Internal,
+            Self::Cancelled(_) | Self::Search(_) => Cause::Internal,
             Self::Simulation(_) | Self::Rejected(_) | Self::Hopeless { .. } | Self::Inputs(_) => {
                 Cause::Study
             }

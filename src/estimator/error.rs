@@ -6,7 +6,6 @@ use crate::network::NetworkError;
 use crate::progress::Cancelled;
 use crate::setting::SettingError;
 use crate::storage::StorageError;
-use crate::storage::files::with_remedy;
 use crate::storage::untrusted::message;
 use crate::study::StudyError;
 use crate::twin::SimulationError;
@@ -36,7 +35,7 @@ pub enum EstimatorError {
     /// The network failed.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// The work folder cannot be used.
+    /// A file cannot be read or written, or the work folder cannot be used.
     #[error(transparent)]
     Work(#[from] StorageError),
     /// The work was cancelled.
@@ -76,14 +75,6 @@ pub enum EstimatorError {
     /// The network cannot take these features.
     #[error("{0}")]
     Inputs(String),
-    /// A file cannot be read or written.
-    #[error("{}: {}", path.display(), with_remedy(error))]
-    Io {
-        /// File.
-        path: PathBuf,
-        /// The system's error.
-        error: std::io::Error,
-    },
     /// A file or folder holds something else, is damaged, or was made for another twin or by another version.
     #[error("{}: {problem}", path.display())]
     File {
@@ -119,17 +110,12 @@ pub enum EstimatorError {
     /// A numerical search failed.
     #[error(transparent)]
     Search(#[from] MathError),
-    /// The cloud cannot be drawn.
-    #[error("{0}")]
-    Cloud(String),
 }
 
 impl EstimatorError {
+    /// A file that cannot be read or written.
     pub(crate) fn io(path: &Path, error: std::io::Error) -> Self {
-        Self::Io {
-            path: path.into(),
-            error,
-        }
+        StorageError::io(path, error).into()
     }
 
     /// A file with this problem, which may quote the file's content.

@@ -10,17 +10,14 @@
 //! | [`Score`] | Newton step and information of a filter's likelihood | twins with equations |
 //! | [`Deviation`] | block means of the output's deviation from a reference run | records that the twin must *track*; starts; misspecified twins |
 
-mod ar;
 mod armax;
-mod arx;
 mod deviation;
 mod regression;
 mod score;
 
-pub use ar::Ar;
 pub use armax::Armax;
-pub use arx::Arx;
 pub use deviation::Deviation;
+pub use regression::{Ar, Arx};
 pub use score::Score;
 
 use crate::likelihood::kalman::FilterError;

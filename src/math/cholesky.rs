@@ -1,6 +1,6 @@
 //! Cholesky factors of matrices of up to some hundred rows.
 
-use super::widest::{Kernel, widest};
+use super::widest::widest;
 use nalgebra::DMatrix;
 
 /// Lanes in which dot products run, whatever the width of the processor's vectors.
@@ -22,71 +22,68 @@ impl Cholesky {
     pub(super) fn new(mut matrix: DMatrix<f64>) -> Option<Self> {
         let rows = matrix.nrows();
         let columns = matrix.as_mut_slice();
-        widest(Factorisation { columns, rows }).then_some(Self { lower: matrix })
+        let is_factored = widest(
+            #[inline(always)]
+            || factor(columns, rows),
+        );
+        is_factored.then_some(Self { lower: matrix })
     }
 
     /// Overwrites `x` by A⁻¹ x.
     pub(super) fn solve(&self, x: &mut [f64]) {
         let lower = self.lower.as_slice();
-        widest(Substitution { lower, x });
+        widest(
+            #[inline(always)]
+            || substitute(lower, x),
+        );
     }
 }
 
 /// Overwrites a matrix of `rows` columns by its factor; returns `false` where it has none.
-struct Factorisation<'a> {
-    columns: &'a mut [f64],
-    rows: usize,
-}
-
-impl Kernel for Factorisation<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        let Self { columns, rows } = self;
-        let mut weights = Vec::with_capacity(rows);
-        for first in (0..rows).step_by(COLUMNS) {
-            let (before, here) = columns.split_at_mut(first * rows);
-            let width = COLUMNS.min(rows - first);
-            if width == COLUMNS {
-                let earlier = before.chunks_exact(rows);
-                weights.clear();
-                weights.extend(
-                    earlier.map(|l| -> [f64; COLUMNS] { std::array::from_fn(|q| l[first + q]) }),
-                );
-                let mut row = first;
-                while row + 16 <= rows {
-                    subtract_block::<16>(before, &weights, row, here, rows);
-                    row += 16;
-                }
-                while row + 4 <= rows {
-                    subtract_block::<4>(before, &weights, row, here, rows);
-                    row += 4;
-                }
-                for row in row..rows {
-                    subtract_block::<1>(before, &weights, row, here, rows);
-                }
+#[inline(always)]
+fn factor(columns: &mut [f64], rows: usize) -> bool {
+    let mut weights = Vec::with_capacity(rows);
+    for first in (0..rows).step_by(COLUMNS) {
+        let (before, here) = columns.split_at_mut(first * rows);
+        let width = COLUMNS.min(rows - first);
+        if width == COLUMNS {
+            let earlier = before.chunks_exact(rows);
+            weights.clear();
+            weights.extend(
+                earlier.map(|l| -> [f64; COLUMNS] { std::array::from_fn(|q| l[first + q]) }),
+            );
+            let mut row = first;
+            while row + 16 <= rows {
+                subtract_block::<16>(before, &weights, row, here, rows);
+                row += 16;
             }
-            for column in 0..width {
-                let diagonal = first + column;
-                let (left, this) = here.split_at_mut(column * rows);
-                let this = &mut this[diagonal..rows];
-                if width < COLUMNS {
-                    subtract_columns(before, diagonal, this, rows);
-                }
-                subtract_columns(left, diagonal, this, rows);
-                if !(this[0] > 0.0 && this[0].is_finite()) {
-                    return false;
-                }
-                this[0] = this[0].sqrt();
-                let inverse = 1.0 / this[0];
-                for value in &mut this[1..] {
-                    *value *= inverse;
-                }
+            while row + 4 <= rows {
+                subtract_block::<4>(before, &weights, row, here, rows);
+                row += 4;
+            }
+            for row in row..rows {
+                subtract_block::<1>(before, &weights, row, here, rows);
             }
         }
-        true
+        for column in 0..width {
+            let diagonal = first + column;
+            let (left, this) = here.split_at_mut(column * rows);
+            let this = &mut this[diagonal..rows];
+            if width < COLUMNS {
+                subtract_columns(before, diagonal, this, rows);
+            }
+            subtract_columns(left, diagonal, this, rows);
+            if !(this[0] > 0.0 && this[0].is_finite()) {
+                return false;
+            }
+            this[0] = this[0].sqrt();
+            let inverse = 1.0 / this[0];
+            for value in &mut this[1..] {
+                *value *= inverse;
+            }
+        }
     }
+    true
 }
 
 /// Takes what the columns `before` explain from rows `row` … `row + ROWS` of the next four columns.
@@ -127,30 +124,20 @@ fn subtract_columns(before: &[f64], diagonal: usize, this: &mut [f64], rows: usi
 }
 
 /// x ← L⁻ᵀ L⁻¹ x.
-struct Substitution<'a> {
-    lower: &'a [f64],
-    x: &'a mut [f64],
-}
-
-impl Kernel for Substitution<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { lower, x } = self;
-        let n = x.len();
-        for j in 0..n {
-            let l = &lower[j * n + j..(j + 1) * n];
-            let value = x[j] / l[0];
-            x[j] = value;
-            for (x, l) in x[j + 1..].iter_mut().zip(&l[1..]) {
-                *x -= value * l;
-            }
+#[inline(always)]
+fn substitute(lower: &[f64], x: &mut [f64]) {
+    let n = x.len();
+    for j in 0..n {
+        let l = &lower[j * n + j..(j + 1) * n];
+        let value = x[j] / l[0];
+        x[j] = value;
+        for (x, l) in x[j + 1..].iter_mut().zip(&l[1..]) {
+            *x -= value * l;
         }
-        for j in (0..n).rev() {
-            let l = &lower[j * n + j..(j + 1) * n];
-            x[j] = (x[j] - dot(&l[1..], &x[j + 1..])) / l[0];
-        }
+    }
+    for j in (0..n).rev() {
+        let l = &lower[j * n + j..(j + 1) * n];
+        x[j] = (x[j] - dot(&l[1..], &x[j + 1..])) / l[0];
     }
 }
 

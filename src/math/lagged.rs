@@ -1,7 +1,7 @@
 //! Regressors made of the past of signals.
 
 use super::Regressors;
-use super::widest::{Kernel, widest};
+use super::widest::widest;
 use nalgebra::DMatrix;
 
 /// A signal and how many of its lags are regressors.
@@ -135,36 +135,28 @@ impl Regressors for LaggedSignals {
 
 /// out_k ← out_k + Σ_j c_j·x_{j+k}; each sum runs in the order of j, whatever the width of vectors.
 fn correlate(c: &[f64], x: &[f64], out: &mut [f64]) {
-    widest(Correlation { c, x, out });
+    widest(
+        #[inline(always)]
+        || correlate_all(c, x, out),
+    );
 }
 
-/// [`correlate`] as a kernel.
-struct Correlation<'a> {
-    c: &'a [f64],
-    x: &'a [f64],
-    out: &'a mut [f64],
-}
-
-impl Kernel for Correlation<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { c, mut x, out } = self;
-        let (wide, rest) = out.as_chunks_mut::<32>();
-        for sums in wide {
-            correlate_block(c, x, sums);
-            x = &x[32..];
-        }
-        let (narrow, rest) = rest.as_chunks_mut::<8>();
-        for sums in narrow {
-            correlate_block(c, x, sums);
-            x = &x[8..];
-        }
-        for sum in rest.as_chunks_mut::<1>().0 {
-            correlate_block(c, x, sum);
-            x = &x[1..];
-        }
+/// [`correlate`] for one width of vectors.
+#[inline(always)]
+fn correlate_all(c: &[f64], mut x: &[f64], out: &mut [f64]) {
+    let (wide, rest) = out.as_chunks_mut::<32>();
+    for sums in wide {
+        correlate_block(c, x, sums);
+        x = &x[32..];
+    }
+    let (narrow, rest) = rest.as_chunks_mut::<8>();
+    for sums in narrow {
+        correlate_block(c, x, sums);
+        x = &x[8..];
+    }
+    for sum in rest.as_chunks_mut::<1>().0 {
+        correlate_block(c, x, sum);
+        x = &x[1..];
     }
 }
 

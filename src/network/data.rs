@@ -1,6 +1,7 @@
 //! Training data: samples in parts, the blocks of an epoch, and the seeds that order them.
 
 use super::NetworkError;
+use crate::setting::number;
 use crate::twin::mix;
 use ndarray::{Array2, Axis};
 use rand::SeedableRng;
@@ -18,36 +19,28 @@ pub type SamplePart<'a> = (Cow<'a, Array2<f64>>, Cow<'a, Array2<f64>>);
 /// Rows of features and targets, both standardised, that need not fit into memory at once: they come in parts.
 ///
 /// Rows are independent of each other and alike, so that any parts are a sample of the whole.
-pub trait Samples: Sync {
+pub struct Samples<'a> {
     /// Features of a row, n.
-    fn features(&self) -> usize;
-
+    pub features: usize,
     /// Targets of a row, d.
-    fn targets(&self) -> usize;
-
+    pub targets: usize,
     /// Rows of each part, in order.
-    fn parts(&self) -> Vec<usize>;
-
-    /// Part number `index`; it is asked for once an epoch.
-    fn part(&self, index: usize) -> Result<SamplePart<'_>, Box<dyn Error + Send + Sync>>;
+    pub parts: Vec<usize>,
+    /// Reads part number i; it is asked for once an epoch.
+    pub read: Box<dyn Fn(usize) -> Result<SamplePart<'a>, Box<dyn Error + Send + Sync>> + 'a>,
 }
 
-/// Samples in memory.
-impl Samples for (&Array2<f64>, &Array2<f64>) {
-    fn features(&self) -> usize {
-        self.0.ncols()
-    }
+debug_by_name!(Samples<'_>);
 
-    fn targets(&self) -> usize {
-        self.1.ncols()
-    }
-
-    fn parts(&self) -> Vec<usize> {
-        vec![self.0.nrows()]
-    }
-
-    fn part(&self, _: usize) -> Result<SamplePart<'_>, Box<dyn Error + Send + Sync>> {
-        Ok((Cow::Borrowed(self.0), Cow::Borrowed(self.1)))
+impl<'a> Samples<'a> {
+    /// Samples in memory: one part.
+    pub fn in_memory(features: &'a Array2<f64>, targets: &'a Array2<f64>) -> Self {
+        Self {
+            features: features.ncols(),
+            targets: targets.ncols(),
+            parts: vec![features.nrows()],
+            read: Box::new(move |_| Ok((Cow::Borrowed(features), Cow::Borrowed(targets)))),
+        }
     }
 }
 
@@ -66,6 +59,11 @@ pub(super) fn derive(seed: u64, purpose: SeedUse, counter: u64) -> u64 {
     mix(mix(mix(seed) ^ purpose as u64) ^ counter)
 }
 
+/// The error of data without `what`, of which `least` are needed.
+pub(super) fn missing(what: &str, least: usize) -> NetworkError {
+    NetworkError::Data(format!("no {what}; at least {least} needed"))
+}
+
 /// Converts a matrix to 32 bits, each row filled up with zeros to `width`; refuses what is not finite.
 pub(super) fn padded(
     what: &'static str,
@@ -77,12 +75,10 @@ pub(super) fn padded(
         for (column, (to, &value)) in to.iter_mut().zip(from).enumerate() {
             *to = value as f32;
             if !to.is_finite() {
-                return Err(NetworkError::NotFinite {
-                    what,
-                    row,
-                    column,
-                    value,
-                });
+                let value = number(value);
+                return Err(NetworkError::Data(format!(
+                    "{what}, row {row}, column {column}: {value} is not a finite 32-bit number"
+                )));
             }
         }
     }
@@ -131,12 +127,6 @@ enum FeedRows {
         /// Most rows of a block.
         most: usize,
     },
-}
-
-/// Rows in memory, and the order in which they are used.
-pub(super) struct FeedBlock<'a> {
-    pub data: Cow<'a, Data>,
-    pub order: Vec<usize>,
 }
 
 impl<'a> Feed<'a> {
@@ -213,13 +203,13 @@ impl<'a> Feed<'a> {
         }
     }
 
-    /// Block number `block` of an epoch, which has these parts.
+    /// Block number `block` of an epoch, which has these parts: rows in memory, and the order in which they are used.
     pub fn block(
         &self,
         parts: &[usize],
         block: usize,
         epoch: usize,
-    ) -> Result<FeedBlock<'_>, NetworkError> {
+    ) -> Result<(Cow<'_, Data>, Vec<usize>), NetworkError> {
         let (data, mut order, number) = match &self.rows {
             FeedRows::InMemory { data, training, .. } => (Cow::Borrowed(data), training.clone(), 0),
             FeedRows::Streamed { .. } => {
@@ -229,7 +219,7 @@ impl<'a> Feed<'a> {
             }
         };
         order.shuffle(&mut self.order(epoch, number));
-        Ok(FeedBlock { data, order })
+        Ok((data, order))
     }
 
     /// The mean of `error` over the rows held out; `None` where there are none.
@@ -293,10 +283,7 @@ fn together(read: &Read<'_>, parts: impl Iterator<Item = usize>) -> Result<Data,
     }
     let stacked = |of: fn(&Data) -> &Array2<f32>| {
         let views: Vec<_> = parts.iter().map(|data| of(data).view()).collect();
-        ndarray::concatenate(Axis(0), &views).map_err(|_| NetworkError::Empty {
-            what: "samples",
-            least: 1,
-        })
+        ndarray::concatenate(Axis(0), &views).map_err(|_| missing("samples", 1))
     };
     Ok(Data {
         features: stacked(|data| &data.features)?,
@@ -311,10 +298,8 @@ fn split(count: usize, share: f64, seed: u64) -> Result<(Vec<usize>, Vec<usize>)
         held_out => held_out,
     };
     if held_out >= count {
-        return Err(NetworkError::Empty {
-            what: "rows left to train on",
-            least: 1 + usize::from(share > 0.0),
-        });
+        let least = 1 + usize::from(share > 0.0);
+        return Err(missing("rows left to train on", least));
     }
     let mut training: Vec<usize> = (0..count).collect();
     let order = derive(seed, SeedUse::Split, 0);
@@ -364,9 +349,9 @@ mod tests {
     fn epoch(feed: &Feed<'_>, epoch: usize) -> Vec<usize> {
         let mut all = Vec::new();
         for (number, parts) in feed.blocks(epoch).iter().enumerate() {
-            let block = feed.block(parts, number, epoch).unwrap();
-            let numbers = &block.data.features;
-            all.extend(block.order.iter().map(|i| numbers[[*i, 0]] as usize));
+            let (data, order) = feed.block(parts, number, epoch).unwrap();
+            let numbers = &data.features;
+            all.extend(order.iter().map(|i| numbers[[*i, 0]] as usize));
         }
         all
     }

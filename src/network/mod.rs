@@ -48,7 +48,7 @@ mod train;
 
 pub use architectures::{Compact, Deep};
 pub(crate) use checkpoints::Checkpoints;
-pub(crate) use data::{SamplePart, Samples};
+pub(crate) use data::Samples;
 pub use error::NetworkError;
 pub(crate) use fused::{BuiltDense, BuiltNormDense};
 pub use fused::{Dense, Leaky, NormDense};
@@ -72,6 +72,7 @@ pub mod layers {
 #[doc(hidden)]
 pub mod untyped {
     pub use super::checkpoints::Checkpoints;
+    pub use super::data::Samples;
     pub use super::multi_head::{Architecture, Network, architecture};
 }
 

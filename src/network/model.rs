@@ -10,7 +10,7 @@ use dfdx::prelude::{
     BuildOnDevice, Const, ConstDim, Cpu, CpuError, Module, ModuleMut, NoneTape, OwnedTape, Tensor,
     TensorCollection, TensorFromVec, Trace,
 };
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayViewMut2, Axis};
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 
@@ -171,34 +171,39 @@ where
 
     /// The trunk's outputs.
     pub(super) fn hidden(&self, features: &Array2<f32>) -> Result<Array2<f32>, NetworkError> {
-        let mut hidden = Array2::zeros((features.nrows(), K::SIZE));
-        for (chunk, mut place) in chunks(features).zip(hidden.axis_chunks_iter_mut(Axis(0), CHUNK))
-        {
-            let values = self.through_trunk(chunk)?.as_vec();
+        self.evaluated(features, K::SIZE, |hidden, mut place| {
+            let values = hidden.as_vec();
             place.iter_mut().zip(values).for_each(|(to, v)| *to = v);
-        }
-        Ok(hidden)
+            Ok(())
+        })
     }
 
     /// The heads' outputs.
     pub(super) fn predict(&self, features: &Array2<f32>) -> Result<Array2<f32>, NetworkError> {
-        let mut predictions = Array2::zeros((features.nrows(), self.heads.len()));
-        let places = predictions.axis_chunks_iter_mut(Axis(0), CHUNK);
-        for (chunk, mut place) in chunks(features).zip(places) {
-            let hidden = self.through_trunk(chunk)?;
+        self.evaluated(features, self.heads.len(), |hidden, mut place| {
             for (head, mut column) in self.heads.iter().zip(place.columns_mut()) {
                 let values = head.try_forward(hidden.clone())?.as_vec();
                 column.iter_mut().zip(values).for_each(|(to, v)| *to = v);
             }
-        }
-        Ok(predictions)
+            Ok(())
+        })
     }
 
-    fn through_trunk(&self, rows: ArrayView2<'_, f32>) -> Result<PlainBatch<K>, NetworkError> {
-        let shape = (rows.nrows(), I::default());
-        let values = rows.iter().copied().collect();
-        let x: PlainBatch<I> = Cpu::default().try_tensor_from_vec(values, shape)?;
-        Ok(self.trunk.try_forward(x)?)
+    /// Puts the features through the trunk; `fill` makes `width` numbers of each row of its outputs.
+    fn evaluated(
+        &self,
+        features: &Array2<f32>,
+        width: usize,
+        fill: impl Fn(PlainBatch<K>, ArrayViewMut2<'_, f32>) -> Result<(), NetworkError>,
+    ) -> Result<Array2<f32>, NetworkError> {
+        let mut all = Array2::zeros((features.nrows(), width));
+        let places = all.axis_chunks_iter_mut(Axis(0), CHUNK);
+        for (rows, place) in features.axis_chunks_iter(Axis(0), CHUNK).zip(places) {
+            let (shape, values) = ((rows.nrows(), I::default()), rows.iter().copied());
+            let x: PlainBatch<I> = Cpu::default().try_tensor_from_vec(values.collect(), shape)?;
+            fill(self.trunk.try_forward(x)?, place)?;
+        }
+        Ok(all)
     }
 
     pub(super) fn weights(&self) -> Vec<NamedTensor> {
@@ -221,7 +226,7 @@ where
                 "of shape {:?} has no place in `{architecture}`; was it stored by another architecture?",
                 tensor.shape
             );
-            Err(NetworkError::tensor(&tensor.name, problem))
+            Err(tensors::misfit(&tensor.name, &problem))
         };
         let mut stored = BTreeMap::new();
         for tensor in weights {
@@ -238,8 +243,4 @@ where
             .next()
             .map_or(Ok(()), |tensor| surplus(tensor))
     }
-}
-
-fn chunks(features: &Array2<f32>) -> impl Iterator<Item = ArrayView2<'_, f32>> {
-    features.axis_chunks_iter(Axis(0), CHUNK)
 }

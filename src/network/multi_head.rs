@@ -1,6 +1,6 @@
 //! Networks whose types are no longer known: the faces that the estimator sees, over the static types of an architecture.
 
-use super::data::{Data, Feed, Samples, SeedUse, derive, padded};
+use super::data::{Data, Feed, Samples, SeedUse, derive, missing, padded};
 use super::model::{self, ModelOf, MultiHeadModel};
 use super::train::Course;
 use super::{Checkpoints, HeadArchitecture, History, NamedTensor, NetworkError, Training};
@@ -28,7 +28,7 @@ pub trait Architecture: Send + Sync + Debug {
     /// A training that was interrupted goes on with what `checkpoints` have kept of it, to the same bits.
     fn train_on(
         &self,
-        samples: &dyn Samples,
+        samples: &Samples<'_>,
         settings: &Training,
         seed: u64,
         checkpoints: &Checkpoints,
@@ -57,9 +57,6 @@ pub trait Network: Send + Sync + Debug {
     ///
     /// A sample's prediction may differ in its last bits (1e-6) with the number of samples that come along.
     fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError>;
-
-    /// The trunk's outputs (samples × hidden width), without dropout.
-    fn hidden(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError>;
 
     /// A network with the same trunk, and heads trained further on `features` and `targets`.
     ///
@@ -101,15 +98,16 @@ impl<A: HeadArchitecture> fmt::Debug for Typed<A> {
 impl<A: HeadArchitecture> Typed<A> {
     fn build(inputs: usize, outputs: usize, seed: u64) -> Result<MultiHead<A>, NetworkError> {
         if inputs > A::Features::SIZE {
-            return Err(NetworkError::TooManyFeatures {
-                architecture: A::ID,
-                features: inputs,
-                limit: A::Features::SIZE,
-            });
+            return Err(NetworkError::Data(format!(
+                "{inputs} features, but architecture `{}` takes at most {}; \
+                 use fewer features or an architecture with larger `Features`",
+                A::ID,
+                A::Features::SIZE
+            )));
         }
         for (what, count) in [("features", inputs), ("targets", outputs)] {
             if count == 0 {
-                return Err(NetworkError::Empty { what, least: 1 });
+                return Err(missing(what, 1));
             }
         }
         let seed = derive(seed, SeedUse::Weights, 0);
@@ -129,21 +127,21 @@ impl<A: HeadArchitecture> Architecture for Typed<A> {
 
     fn train_on(
         &self,
-        samples: &dyn Samples,
+        samples: &Samples<'_>,
         settings: &Training,
         seed: u64,
         checkpoints: &Checkpoints,
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError> {
         settings.check()?;
-        let network = Self::build(samples.features(), samples.targets(), seed)?;
+        let network = Self::build(samples.features, samples.targets, seed)?;
         let read = |index: usize| {
-            let part = samples.part(index);
-            let (features, targets) = part.map_err(|e| NetworkError::Samples(e.to_string()))?;
+            let part = (samples.read)(index);
+            let (features, targets) = part.map_err(|e| NetworkError::Data(e.to_string()))?;
             network.data(&features, &targets)
         };
-        let width = A::Features::SIZE + samples.targets();
-        let feed = Feed::new(&samples.parts(), width, &read, settings.holdout, seed)?;
+        let width = A::Features::SIZE + samples.targets;
+        let feed = Feed::new(&samples.parts, width, &read, settings.holdout, seed)?;
         let course = Course {
             settings,
             seed,
@@ -185,15 +183,13 @@ impl<A: HeadArchitecture> fmt::Debug for MultiHead<A> {
     }
 }
 
-fn expect(what: &'static str, expected: usize, found: usize) -> Result<(), NetworkError> {
-    if expected == found {
-        return Ok(());
+fn expect(what: &str, expected: usize, found: usize) -> Result<(), NetworkError> {
+    match expected == found {
+        true => Ok(()),
+        false => Err(NetworkError::Data(format!(
+            "{what}: expected {expected}, found {found}"
+        ))),
     }
-    Err(NetworkError::Size {
-        what,
-        expected,
-        found,
-    })
 }
 
 impl<A: HeadArchitecture> MultiHead<A> {
@@ -224,10 +220,6 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
 
     fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
         Ok((self.model.predict(&self.rows(features)?)?).mapv(f64::from))
-    }
-
-    fn hidden(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
-        Ok((self.model.hidden(&self.rows(features)?)?).mapv(f64::from))
     }
 
     fn tune_heads(

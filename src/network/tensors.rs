@@ -106,6 +106,11 @@ pub(super) fn collect<M: TensorCollection<f32, Cpu> + Clone>(
     .expect("collecting refuses nothing");
 }
 
+/// The error of a stored tensor.
+pub(super) fn misfit(name: &str, problem: &str) -> NetworkError {
+    NetworkError::Data(format!("tensor `{name}` {problem}"))
+}
+
 /// Gives each tensor of `module` the values stored under its name, taking them out of `stored`.
 pub(super) fn assign<'s, M: TensorCollection<f32, Cpu>>(
     module: &mut M,
@@ -114,7 +119,7 @@ pub(super) fn assign<'s, M: TensorCollection<f32, Cpu>>(
     stored: &mut BTreeMap<&'s str, &'s NamedTensor>,
 ) -> Result<(), NetworkError> {
     change_each(module, prefix, None, |name, expected, values| {
-        let refuse = |problem: String| Err(NetworkError::tensor(name, problem));
+        let refuse = |problem: String| Err(misfit(name, &problem));
         let Some(found) = stored.remove(name) else {
             return refuse(format!(
                 "of shape {expected:?} is missing; was it stored by `{architecture}`?"

@@ -2,7 +2,7 @@
 
 use super::adam::Adam;
 use super::checkpoints::{Position, TrainingState};
-use super::data::{Feed, FeedBlock, SeedUse, derive, gathered};
+use super::data::{Feed, SeedUse, derive, gathered};
 use super::loss::Loss;
 use super::model::{FirstWeight, Layers, MultiHeadModel};
 use super::{Checkpoints, History, NamedTensor, NetworkError, Training};
@@ -128,8 +128,7 @@ where
         let epoch = self.at.epoch;
         let parts = feed.blocks(epoch);
         while self.at.block < parts.len() {
-            let FeedBlock { data, order } =
-                feed.block(&parts[self.at.block], self.at.block, epoch)?;
+            let (data, order) = feed.block(&parts[self.at.block], self.at.block, epoch)?;
             for batch in order.chunks(settings.batch) {
                 let device = Cpu::seed_from_u64(derive(seed, SeedUse::Dropout, self.at.step));
                 self.at.step += 1;

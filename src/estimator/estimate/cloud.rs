@@ -10,7 +10,7 @@ use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::RefinedEstimate;
 use crate::estimator::settings::CloudSampler;
 use crate::fit::posterior::PosteriorRegion;
-use crate::math::{median, principal_axes};
+use crate::math::{MathError, median, principal_axes};
 use crate::twin::{Interval, Noise, Parameter, ParameterSpace};
 use nalgebra::{DMatrix, DVector};
 use std::borrow::Cow;
@@ -72,7 +72,7 @@ fn sampler(
 ///
 /// `(θ − centre)ᵀ G (θ − centre)` follows χ² with d degrees of freedom.
 fn ellipsoid(centre: &DVector<f64>, information: DMatrix<f64>) -> Result<Sampler, EstimatorError> {
-    let singular = || EstimatorError::Cloud("the information is not positive definite".into());
+    let singular = || MathError::fatal("the information is not positive definite");
     let factor = information.cholesky().ok_or_else(singular)?;
     // L⁻¹; a Cholesky factor has a positive diagonal.
     let identity = DMatrix::identity(centre.len(), centre.len());

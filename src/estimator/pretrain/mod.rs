@@ -7,14 +7,13 @@ use crate::estimator::project::{PresetName, Project};
 use crate::estimator::readout::{Calibration, Readout, Scaler, Standardiser};
 use crate::estimator::settings::{Inputs, Settings};
 use crate::estimator::shards::{BankPlan, ShardedBank};
-use crate::network::{Checkpoints, History, NetworkError, SamplePart, Samples};
+use crate::network::{Checkpoints, History, NetworkError, Samples};
 use crate::progress::Progress;
 use crate::storage::sweep_beside;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use ndarray::Array2;
 use serde_json::json;
 use std::borrow::Cow;
-use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -161,14 +160,23 @@ impl<'a> PretrainPlan<'a> {
             }
         };
         let targets = Scaler::fit(&first.theta);
-        let samples = Standardised {
-            bank,
-            inputs: &inputs,
-            targets: &targets,
+        let samples = Samples {
+            features: prior.dim(),
+            targets: d,
+            parts: bank.parts(),
+            read: Box::new(|index| {
+                let draws = bank.part(index)?;
+                let features = inputs.apply(&draws.features);
+                Ok((
+                    Cow::Owned(features),
+                    Cow::Owned(targets.apply(&draws.theta)),
+                ))
+            }),
         };
         let training = &settings.training;
         let (network, history) =
             (recipe.architecture).train_on(&samples, training, seed, checkpoints, progress)?;
+        drop(samples);
         let stage = progress.stage("calibration", CALIBRATION);
         let Draws {
             theta, features, ..
@@ -206,34 +214,6 @@ fn first_rows(bank: &dyn Bank) -> Result<Draws, EstimatorError> {
             "part {index} of the bank: another number of features; make the bank again"
         ))
     })
-}
-
-/// A bank as the network sees it.
-struct Standardised<'a> {
-    bank: &'a dyn Bank,
-    inputs: &'a Standardiser,
-    targets: &'a Scaler,
-}
-
-impl Samples for Standardised<'_> {
-    fn features(&self) -> usize {
-        self.inputs.mean.len()
-    }
-
-    fn targets(&self) -> usize {
-        self.targets.mean.len()
-    }
-
-    fn parts(&self) -> Vec<usize> {
-        self.bank.parts()
-    }
-
-    fn part(&self, index: usize) -> Result<SamplePart<'_>, Box<dyn Error + Send + Sync>> {
-        let draws = self.bank.part(index)?;
-        let features = self.inputs.apply(&draws.features);
-        let targets = self.targets.apply(&draws.theta);
-        Ok((Cow::Owned(features), Cow::Owned(targets)))
-    }
 }
 
 /// A pretraining whose work is kept beside the estimator's place until that is there.

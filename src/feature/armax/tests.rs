@@ -110,3 +110,99 @@ fn what_cannot_be_fitted_is_named() {
             .contains("output 1 is constant")
     );
 }
+
+/// The estimate of models of known processes.
+mod estimates {
+    use super::super::*;
+    use crate::twin::Noise;
+
+    const A: [f64; 2] = [1.5, -0.7];
+    const B: [f64; 2] = [1.0, 0.5];
+    const C: [f64; 2] = [0.6, 0.3];
+
+    /// An ARMAX(2, 2, 2) record: output and input.
+    fn record(samples: usize, seed: u64) -> (Vec<f64>, Vec<f64>) {
+        let noise = Noise::new(seed, "armax", 0);
+        let (mut input, mut innovation) = (noise.source("u"), noise.source("e"));
+        let mut draw = |n: usize| -> Vec<f64> { (0..n).map(|_| input.normal()).collect() };
+        let u = draw(samples);
+        let e: Vec<f64> = (0..samples).map(|_| 0.5 * innovation.normal()).collect();
+        let mut y = vec![0.0; samples];
+        for t in 2..samples {
+            let sum = |l: [f64; 2], x: &[f64]| l[0] * x[t - 1] + l[1] * x[t - 2];
+            y[t] = sum(A, &y) + sum(B, &u) + e[t] + sum(C, &e);
+        }
+        (y, u)
+    }
+
+    fn orders(r: usize) -> Orders {
+        let (p, q, inputs) = (2, 2, 1);
+        Orders { p, q, r, inputs }
+    }
+
+    /// Mean over records within four of its standard errors of the truth, up to the bias of order 1/N; that of ARX of
+    /// the same orders is not.
+    #[test]
+    fn coefficients_are_those_of_the_process_and_arx_is_biased() {
+        let (records, truth) = (60u32, [A, B, C].concat());
+        let found: Vec<_> = (0..records)
+            .map(|seed| {
+                let (y, u) = record(1000, seed.into());
+                let model = estimate(&y, std::slice::from_ref(&u), orders(2)).unwrap();
+                let arx = regress(lagged(&y, 2, &[u], 2), 2).unwrap().coefficients;
+                (model, arx)
+            })
+            .collect();
+        let n = f64::from(records);
+        for (i, truth) in truth.into_iter().enumerate() {
+            let of = |model: &ArmaxModel| model.coefficients[i] - truth;
+            let mean = found.iter().map(|(m, _)| of(m)).sum::<f64>() / n;
+            let variance = found
+                .iter()
+                .map(|(m, _)| (of(m) - mean).powi(2))
+                .sum::<f64>()
+                / n;
+            let error = (variance / n).sqrt();
+            assert!(mean.abs() < 4.0 * error + 3e-3, "{i}: {mean} of {error}");
+            if i < 4 {
+                let bias = found.iter().map(|(_, arx)| arx[i] - truth).sum::<f64>() / n;
+                // u(t − 1) is independent of all other regressors: b₁ has no bias.
+                assert!(
+                    i == 2 || bias.abs() > 10.0 * error,
+                    "{i}: {bias} of {error}"
+                );
+            }
+        }
+        let innovation = found.iter().map(|(m, _)| m.innovation).sum::<f64>() / n;
+        assert!((innovation / 0.5 - 1.0).abs() < 0.01, "{innovation}");
+    }
+
+    /// A refined estimate varies less than that of the two regressions.
+    #[test]
+    fn refinement_pays() {
+        let (mut before, mut after) = (0.0, 0.0);
+        for seed in 0..60 {
+            let (y, u) = record(300, seed);
+            let inputs = [u];
+            let series = ArmaxSeries::new(&y, &inputs, orders(2));
+            let error = |c: &[f64]| (c[4] - C[0]).powi(2) + (c[5] - C[1]).powi(2);
+            before += error(&series.by_regressions().unwrap());
+            after += error(&estimate(&y, &inputs, orders(2)).unwrap().coefficients);
+        }
+        assert!(after < 0.8 * before, "{after} after {before}");
+    }
+
+    #[test]
+    fn zeros_are_drawn_inside_and_no_further() {
+        assert!(is_invertible(vec![0.9]) && !is_invertible(vec![-1.0]));
+        // Zeros 0.5 and 2.
+        assert!(!is_invertible(vec![-2.5, 1.0]) && !is_invertible(vec![f64::NAN]));
+        let mut c = [-2.5, 1.0];
+        make_invertible(&mut c);
+        let value = |z: f64| z * z + c[0] * z + c[1];
+        assert!(value(LARGEST_ZERO).abs() < 1e-9 && value(0.25 * LARGEST_ZERO).abs() < 1e-9);
+        let mut inside = [-0.9, 0.2];
+        make_invertible(&mut inside);
+        assert_eq!(inside, [-0.9, 0.2]);
+    }
+}

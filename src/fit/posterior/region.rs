@@ -77,7 +77,7 @@ impl PosteriorRegion {
     pub fn squared_distance(&self, theta: &[f64]) -> f64 {
         let away = DVector::from_fn(theta.len(), |j, _| theta[j] - self.theta[j]);
         solve_truncated(&self.axes, &away, LEAST_AXIS)
-            .map_or(f64::INFINITY, |own| own.step.norm_squared())
+            .map_or(f64::INFINITY, |own| own.norm_squared())
     }
 }
 

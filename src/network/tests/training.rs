@@ -49,7 +49,7 @@ fn a_listener_counts_the_epochs_and_cancels() {
     let (features, targets) = samples(40, 3, 1);
     let listener = Arc::new(StopAt(4, AtomicU64::new(0)));
     let progress = Progress::new(listener.clone());
-    let (samples, nowhere) = ((&features, &targets), Checkpoints::none());
+    let (samples, nowhere) = (Samples::in_memory(&features, &targets), Checkpoints::none());
     let result = architecture::<Mixed>().train_on(&samples, &quick(50), 1, &nowhere, &progress);
     assert_eq!(result.unwrap_err(), NetworkError::Cancelled(Cancelled));
     assert_eq!(listener.1.load(Ordering::Relaxed), 4);
@@ -114,7 +114,7 @@ fn the_penalty_turns_the_heads_apart() {
 #[test]
 fn a_state_that_is_damaged_or_of_another_network_counts_as_none() {
     let (features, targets) = samples(64, 3, 1);
-    let samples = (&features, &targets);
+    let samples = Samples::in_memory(&features, &targets);
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join("training");
     let kept = || Checkpoints::new(&path, Duration::ZERO);
@@ -143,7 +143,7 @@ fn a_state_that_is_damaged_or_of_another_network_counts_as_none() {
 fn a_state_that_cannot_be_kept_is_said() {
     let (features, targets) = samples(64, 3, 1);
     let nowhere = Checkpoints::new("/nowhere/training", Duration::ZERO);
-    let samples = (&features, &targets);
+    let samples = Samples::in_memory(&features, &targets);
     let error = architecture::<Mixed>()
         .train_on(&samples, &quick(1), 1, &nowhere, &Progress::silent())
         .unwrap_err();
