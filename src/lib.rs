@@ -143,7 +143,10 @@ pub mod prelude;
 pub mod fuzzing {
     /// Banks.
     pub mod banks {
-        pub use crate::estimator::fuzzing::*;
+        pub use crate::estimator::bank::file::{read, write};
+        pub use crate::estimator::bank::{Bank, Draws};
+        pub use crate::estimator::shards::{BankPlan, ShardedBank, merge, merge_into_file};
+        pub use crate::storage::work::Share;
     }
     /// Model descriptions of FMUs.
     #[cfg(feature = "fmi")]

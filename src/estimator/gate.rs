@@ -10,7 +10,7 @@
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-A.
 
-use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
+use crate::estimator::bank::{Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::settings::{GateForm, GateSettings};
 use crate::math::{Whitening, median, quantile, rank_p_value, to_vector};
@@ -69,8 +69,6 @@ pub struct GateTest<'a> {
     /// Progress sink.
     pub progress: &'a Progress,
 }
-
-debug_by_name!(GateTest<'_>);
 
 impl GateTest<'_> {
     /// Simulates the null at `theta`.
@@ -189,7 +187,7 @@ impl GateTest<'_> {
     }
 
     /// `size` simulations at one θ.
-    fn repeat(
+    pub fn repeat(
         &self,
         theta: &[f64],
         size: usize,
@@ -211,10 +209,7 @@ impl GateTest<'_> {
         let noise = self.noise.child(purpose);
         let draw = |i: u64, attempt: usize, _| {
             let theta = thetas.get((i as usize + attempt) % thetas.len().max(1));
-            Ok(theta.map(|theta| Draw {
-                theta: theta.clone(),
-                drive: Cow::Borrowed(self.drive),
-            }))
+            Ok(theta.map(|theta| (theta.clone(), Cow::Borrowed(self.drive))))
         };
         (self.simulator).draws(0..size as u64, |i| noise.sample(i), draw, stage)
     }

@@ -47,8 +47,6 @@ mod project;
 mod readout;
 mod settings;
 
-pub(crate) mod fuzzing;
-
 pub(crate) mod bank;
 mod gate;
 mod refine;
@@ -56,7 +54,7 @@ pub(crate) mod shards;
 
 pub use error::EstimatorError;
 pub(crate) use estimate::Contributions;
-pub use estimate::{Estimate, EstimateOptions, PointEstimate, Refit, Together, Tracking};
+pub use estimate::{Estimate, EstimateOptions, Refit, Together, Tracking};
 pub use estimator::Estimator;
 pub use gate::GateOutcome;
 pub(crate) use pretrain::Pretraining;
@@ -64,6 +62,7 @@ pub use pretrain::{PretrainOptions, pretrain};
 pub(crate) use project::Recipe;
 pub use project::{PresetName, Project};
 pub(crate) use readout::INTERVAL_LEVEL;
+pub use readout::PointEstimate;
 pub use settings::{
     CloudSampler, CloudSettings, GateForm, GateSettings, Inputs, RefineSettings, Settings,
 };

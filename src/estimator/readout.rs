@@ -2,6 +2,7 @@
 
 use crate::math::{MathError, Whitening, quantile, to_array, to_matrix};
 use crate::network::{Network, NetworkError};
+use crate::twin::ParameterSpace;
 use ndarray::{Array1, Array2, Axis, aview1, concatenate};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::Arc;
@@ -239,27 +240,44 @@ pub struct Calibration {
     pub truth: Array2<f64>,
 }
 
-/// Errors to expect of a prediction, parameter by parameter, in parameter units.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Spread {
-    /// Root mean square error.
+/// Parameters with their errors.
+#[derive(Debug, Clone)]
+pub struct PointEstimate {
+    /// Values, within the bounds.
+    pub theta: Vec<f64>,
+    /// Standard errors.
     pub std_error: Vec<f64>,
-    /// Offset of the lower end from the prediction.
+    /// Lower ends of the 90 % interval, within the bounds.
     pub low: Vec<f64>,
-    /// Offset of the upper end.
+    /// Upper ends.
     pub high: Vec<f64>,
 }
 
-impl Spread {
-    /// Creates the intervals of normal errors with these standard deviations.
-    pub fn normal(std_error: Vec<f64>) -> Self {
-        let reach = Normal::standard().inverse_cdf(0.5 + 0.5 * INTERVAL_LEVEL);
-        let ends = |sign: f64| std_error.iter().map(|s| sign * reach * s).collect();
+impl PointEstimate {
+    /// Creates an estimate whose interval ends lie these offsets away.
+    fn new(
+        theta: Vec<f64>,
+        std_error: Vec<f64>,
+        [low, high]: [Vec<f64>; 2],
+        space: &ParameterSpace,
+    ) -> Self {
+        let shifted = |by: &[f64]| {
+            let moved: Vec<f64> = theta.iter().zip(by).map(|(t, b)| t + b).collect();
+            space.clamp(&moved)
+        };
         Self {
-            low: ends(-1.0),
-            high: ends(1.0),
+            low: shifted(&low),
+            high: shifted(&high),
             std_error,
+            theta,
         }
+    }
+
+    /// Creates an estimate with normal errors of these standard deviations.
+    pub fn normal(theta: Vec<f64>, std_error: Vec<f64>, space: &ParameterSpace) -> Self {
+        let reach = Normal::standard().inverse_cdf(0.5 + 0.5 * INTERVAL_LEVEL);
+        let ends = [-reach, reach].map(|reach| std_error.iter().map(|s| reach * s).collect());
+        Self::new(theta, std_error, ends, space)
     }
 }
 
@@ -295,29 +313,34 @@ impl Calibration {
         nearest.into_iter().map(|(_, i)| i).collect()
     }
 
-    /// Errors of the simulations whose predictions lie nearest to `prediction`, distances in `widths`; ends are the
-    /// quantiles (1 ± [`INTERVAL_LEVEL`])/2. `None` without simulations.
-    pub fn spread(&self, prediction: &[f64], widths: &[f64]) -> Option<Spread> {
-        let nearest = self.nearest(prediction, widths);
-        let mut spread = Spread::default();
-        for j in 0..prediction.len() {
+    /// The prediction θ with the errors of the simulations whose predictions lie nearest, distances in `widths`; ends are the quantiles
+    /// (1 ± [`INTERVAL_LEVEL`])/2 of these errors. `None` without simulations.
+    pub fn estimate(
+        &self,
+        theta: Vec<f64>,
+        widths: &[f64],
+        space: &ParameterSpace,
+    ) -> Option<PointEstimate> {
+        let nearest = self.nearest(&theta, widths);
+        let (mut std_error, mut ends) = (vec![], [vec![], vec![]]);
+        for j in 0..theta.len() {
             let errors: Vec<f64> = (nearest.iter())
                 .map(|&i| self.truth[[i, j]] - self.predicted[[i, j]])
                 .collect();
             let square = errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64;
-            spread.std_error.push(square.sqrt());
+            std_error.push(square.sqrt());
             let tail = tail(errors.len(), 0.5 - 0.5 * INTERVAL_LEVEL);
-            spread.low.push(quantile(&errors, tail).ok()?);
-            spread.high.push(quantile(&errors, 1.0 - tail).ok()?);
+            ends[0].push(quantile(&errors, tail).ok()?);
+            ends[1].push(quantile(&errors, 1.0 - tail).ok()?);
         }
-        Some(spread)
+        Some(PointEstimate::new(theta, std_error, ends, space))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::Noise;
+    use crate::twin::{Noise, Parameter};
 
     /// Errors grow with θ; the interval at a prediction follows, and covers nine in ten new errors.
     #[test]
@@ -335,12 +358,14 @@ mod tests {
             predicted: column(|p| p.1),
             truth: column(|p| p.0),
         };
-        let trials = 1000;
+        let (trials, wide) = (1000, Parameter::new("theta", "", -9.0, 9.0));
+        let space = ParameterSpace::new([wide]);
         let covered = (0..trials).filter(|&i| {
             let (theta, predicted) = draw(i, "trial");
-            let spread = calibration.spread(&[predicted], &[1.0]).unwrap();
-            let ends = predicted + spread.low[0]..=predicted + spread.high[0];
-            ends.contains(&theta)
+            let estimate = calibration
+                .estimate(vec![predicted], &[1.0], &space)
+                .unwrap();
+            (estimate.low[0]..=estimate.high[0]).contains(&theta)
         });
         let bounds = crate::math::binomial_bounds(trials, 0.9, 0.999).unwrap();
         let covered = covered.count() as u64;

@@ -1,7 +1,7 @@
 //! Autoregressive coefficients, with and without inputs.
 
 use super::{FeatureError, FeatureMap, FeatureRecipe, check_long, check_varies};
-use crate::math::{Lagged, LaggedSignals, LeastSquares, MathError, Regression, one_column};
+use crate::math::{Lagged, LaggedSignals, LeastSquares, MathError, Regression};
 use crate::record::{Drive, Signal};
 use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
@@ -114,7 +114,7 @@ impl FeatureMap for RegressionMap {
         for y in outputs.columns() {
             let mut signals = vec![Lagged::new(y.to_vec(), self.p)];
             signals.extend(inputs.iter().cloned());
-            all.extend_from_slice(regress(signals, start)?.coefficients.as_slice());
+            all.extend(regress(signals, start)?.coefficients);
         }
         Ok(all)
     }
@@ -122,7 +122,7 @@ impl FeatureMap for RegressionMap {
 
 /// Regresses the first signal on the lags of all, from sample `start` on.
 pub(super) fn regress(signals: Vec<Lagged>, start: usize) -> Result<Regression, MathError> {
-    let target = one_column(&signals[0].values[start..]);
+    let target = signals[0].values[start..].to_vec();
     let phi = LaggedSignals::new(signals, start);
     LeastSquares::with_gram(&phi, &phi.gram())?.solve(&target)
 }

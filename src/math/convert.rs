@@ -22,8 +22,3 @@ pub fn to_vector(line: &ArrayRef1<f64>) -> DVector<f64> {
 pub fn one_row(values: &[f64]) -> Array2<f64> {
     Array2::from_shape_fn((1, values.len()), |(_, j)| values[j])
 }
-
-/// Returns the matrix of one column.
-pub fn one_column(values: &[f64]) -> DMatrix<f64> {
-    DMatrix::from_column_slice(values.len(), 1, values)
-}

@@ -18,7 +18,7 @@ mod svd;
 mod whitening;
 mod widest;
 
-pub(crate) use convert::{one_column, one_row, to_array, to_matrix, to_vector};
+pub(crate) use convert::{one_row, to_array, to_matrix, to_vector};
 pub(crate) use difference::Stencil;
 pub use error::MathError;
 pub(crate) use lagged::{Lagged, LaggedSignals};

@@ -110,23 +110,20 @@ pub(super) type Read<'a> = dyn Fn(usize) -> Result<Data, NetworkError> + 'a;
 pub(super) struct Feed<'a> {
     read: &'a Read<'a>,
     seed: u64,
-    rows: FeedRows,
+    /// Rows of each part.
+    sizes: Vec<usize>,
+    /// Most rows of a block.
+    most: usize,
+    /// Parts before this one are trained on, the others are held out; all are trained on in memory.
+    training: usize,
+    memory: Option<InMemory>,
 }
 
-enum FeedRows {
-    InMemory {
-        data: Data,
-        training: Vec<usize>,
-        held_out: Box<Data>,
-    },
-    Streamed {
-        /// Rows of each part.
-        sizes: Vec<usize>,
-        /// Parts before this one are trained on, the others are held out.
-        training: usize,
-        /// Most rows of a block.
-        most: usize,
-    },
+/// All parts, read once.
+struct InMemory {
+    data: Data,
+    training: Vec<usize>,
+    held_out: Data,
 }
 
 impl<'a> Feed<'a> {
@@ -150,57 +147,51 @@ impl<'a> Feed<'a> {
         seed: u64,
     ) -> Result<Self, NetworkError> {
         let count: usize = sizes.iter().sum();
-        let rows = if sizes.len() < 2 || count <= most {
-            let data = together(read, 0..sizes.len())?;
+        let mut feed = Self {
+            read,
+            seed,
+            sizes: sizes.to_vec(),
+            most,
+            training: sizes.len(),
+            memory: None,
+        };
+        if sizes.len() < 2 || count <= most {
+            let data = feed.parts(0..sizes.len())?;
             let (training, held_out) = split(count, share, seed)?;
-            let held_out = Box::new(Data {
-                features: data.features.select(Axis(0), &held_out),
-                targets: data.targets.select(Axis(0), &held_out),
-            });
-            FeedRows::InMemory {
+            feed.memory = Some(InMemory {
+                held_out: Data {
+                    features: data.features.select(Axis(0), &held_out),
+                    targets: data.targets.select(Axis(0), &held_out),
+                },
                 data,
                 training,
-                held_out,
-            }
-        } else {
-            let (mut training, mut held_out) = (sizes.len(), 0);
-            while training > 1 && (held_out as f64) < share * count as f64 {
-                training -= 1;
-                held_out += sizes[training];
-            }
-            FeedRows::Streamed {
-                sizes: sizes.to_vec(),
-                training,
-                most,
-            }
-        };
-        Ok(Self { read, seed, rows })
+            });
+            return Ok(feed);
+        }
+        let mut held_out = 0;
+        while feed.training > 1 && (held_out as f64) < share * count as f64 {
+            feed.training -= 1;
+            held_out += sizes[feed.training];
+        }
+        Ok(feed)
     }
 
     /// Rows that are trained on.
     pub fn rows(&self) -> usize {
-        match &self.rows {
-            FeedRows::InMemory { training, .. } => training.len(),
-            FeedRows::Streamed {
-                sizes, training, ..
-            } => sizes[..*training].iter().sum(),
+        match &self.memory {
+            Some(memory) => memory.training.len(),
+            None => self.sizes[..self.training].iter().sum(),
         }
     }
 
     /// The parts of each block of an epoch.
     pub fn blocks(&self, epoch: usize) -> Vec<Vec<usize>> {
-        match &self.rows {
-            FeedRows::InMemory { .. } => vec![vec![]],
-            FeedRows::Streamed {
-                sizes,
-                training,
-                most,
-            } => {
-                let mut parts: Vec<usize> = (0..*training).collect();
-                parts.shuffle(&mut self.order(epoch, 0));
-                grouped(&parts, sizes, *most)
-            }
+        if self.memory.is_some() {
+            return vec![vec![]];
         }
+        let mut parts: Vec<usize> = (0..self.training).collect();
+        parts.shuffle(&mut self.order(epoch, 0));
+        grouped(&parts, &self.sizes, self.most)
     }
 
     /// Block number `block` of an epoch, which has these parts: rows in memory, and the order in which they are used.
@@ -210,10 +201,10 @@ impl<'a> Feed<'a> {
         block: usize,
         epoch: usize,
     ) -> Result<(Cow<'_, Data>, Vec<usize>), NetworkError> {
-        let (data, mut order, number) = match &self.rows {
-            FeedRows::InMemory { data, training, .. } => (Cow::Borrowed(data), training.clone(), 0),
-            FeedRows::Streamed { .. } => {
-                let data = together(self.read, parts.iter().copied())?;
+        let (data, mut order, number) = match &self.memory {
+            Some(memory) => (Cow::Borrowed(&memory.data), memory.training.clone(), 0),
+            None => {
+                let data = self.parts(parts.iter().copied())?;
                 let order = (0..data.targets.nrows()).collect();
                 (Cow::Owned(data), order, 1 + block)
             }
@@ -227,25 +218,35 @@ impl<'a> Feed<'a> {
         &self,
         error: impl Fn(&Data) -> Result<f64, NetworkError>,
     ) -> Result<Option<f64>, NetworkError> {
-        match &self.rows {
-            FeedRows::InMemory { held_out, .. } if held_out.targets.is_empty() => Ok(None),
-            FeedRows::InMemory { held_out, .. } => Ok(Some(error(held_out)?)),
-            FeedRows::Streamed {
-                sizes,
-                training,
-                most,
-            } => {
-                let parts: Vec<usize> = (*training..sizes.len()).collect();
-                let (mut total, mut rows) = (0.0, 0.0);
-                for block in grouped(&parts, sizes, *most) {
-                    let data = together(self.read, block.into_iter())?;
-                    let here = data.targets.nrows() as f64;
-                    total += here * error(&data)?;
-                    rows += here;
-                }
-                Ok((rows > 0.0).then_some(total / rows))
-            }
+        if let Some(InMemory { held_out, .. }) = &self.memory {
+            let is_empty = held_out.targets.is_empty();
+            return (!is_empty).then(|| error(held_out)).transpose();
         }
+        let parts: Vec<usize> = (self.training..self.sizes.len()).collect();
+        let (mut total, mut rows) = (0.0, 0.0);
+        for block in grouped(&parts, &self.sizes, self.most) {
+            let data = self.parts(block.into_iter())?;
+            let here = data.targets.nrows() as f64;
+            total += here * error(&data)?;
+            rows += here;
+        }
+        Ok((rows > 0.0).then_some(total / rows))
+    }
+
+    /// These parts, one after another.
+    fn parts(&self, parts: impl Iterator<Item = usize>) -> Result<Data, NetworkError> {
+        let mut parts = parts.map(self.read).collect::<Result<Vec<Data>, _>>()?;
+        if parts.len() == 1 {
+            return Ok(parts.remove(0));
+        }
+        let stacked = |of: fn(&Data) -> &Array2<f32>| {
+            let views: Vec<_> = parts.iter().map(|data| of(data).view()).collect();
+            ndarray::concatenate(Axis(0), &views).map_err(|_| missing("samples", 1))
+        };
+        Ok(Data {
+            features: stacked(|data| &data.features)?,
+            targets: stacked(|data| &data.targets)?,
+        })
     }
 
     /// The generator that orders the rows of a block, or (number 0) the parts or the only block of an epoch. An epoch depends
@@ -274,21 +275,6 @@ fn grouped(parts: &[usize], sizes: &[usize], most: usize) -> Vec<Vec<usize>> {
         rows += sizes[part];
     }
     blocks
-}
-
-fn together(read: &Read<'_>, parts: impl Iterator<Item = usize>) -> Result<Data, NetworkError> {
-    let mut parts = parts.map(read).collect::<Result<Vec<Data>, _>>()?;
-    if parts.len() == 1 {
-        return Ok(parts.remove(0));
-    }
-    let stacked = |of: fn(&Data) -> &Array2<f32>| {
-        let views: Vec<_> = parts.iter().map(|data| of(data).view()).collect();
-        ndarray::concatenate(Axis(0), &views).map_err(|_| missing("samples", 1))
-    };
-    Ok(Data {
-        features: stacked(|data| &data.features)?,
-        targets: stacked(|data| &data.targets)?,
-    })
 }
 
 /// Indices of the rows to train on and of those held out.
@@ -362,7 +348,7 @@ mod tests {
         let read = |index: usize| Ok(part(&sizes, index));
         for (most, in_memory) in [(100, true), (8, false), (3, false)] {
             let feed = Feed::with_block(&sizes, most, &read, 0.2, 1).unwrap();
-            assert_eq!(matches!(feed.rows, FeedRows::InMemory { .. }), in_memory);
+            assert_eq!(feed.memory.is_some(), in_memory);
             let [first, second] = [0, 1].map(|e| epoch(&feed, e));
             assert_ne!(first, second);
             assert_eq!(

@@ -24,14 +24,8 @@ use ndarray::{Array2, s};
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Where to simulate.
-#[derive(Debug, Clone)]
-pub struct Draw<'a> {
-    /// Parameters.
-    pub theta: Vec<f64>,
-    /// Time grid and inputs.
-    pub drive: Cow<'a, Drive>,
-}
+/// Where to simulate: θ, and time grid with inputs.
+pub type Draw<'a> = (Vec<f64>, Cow<'a, Drive>);
 
 /// Parameters and the features simulated there, row by row.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -155,10 +149,7 @@ impl Prior {
                 let drive = (self.drives.draw(noise)).map_err(|error| {
                     EstimatorError::Bank(format!("the input cannot be made: {error}"))
                 })?;
-                Ok(Some(Draw {
-                    theta: self.space.draw_prior(noise),
-                    drive: Cow::Owned(drive),
-                }))
+                Ok(Some((self.space.draw_prior(noise), Cow::Owned(drive))))
             },
             stage,
         )

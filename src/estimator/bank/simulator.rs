@@ -236,12 +236,12 @@ impl FeatureSimulator {
                 }
             }
             let all: Vec<_> = (places.iter())
-                .map(|(_, draw, noise)| (&draw.theta[..], &*draw.drive, *noise))
+                .map(|(_, (theta, drive), noise)| (&theta[..], &**drive, *noise))
                 .collect();
             let features = self.features(&all);
-            for ((row, draw, _), features) in places.into_iter().zip(features) {
+            for ((row, (theta, _), _), features) in places.into_iter().zip(features) {
                 match features {
-                    Ok(features) => row.drawn = Some([draw.theta, features]),
+                    Ok(features) => row.drawn = Some([theta, features]),
                     Err(EstimatorError::Rejected(text)) => {
                         row.failed += 1;
                         row.reason = Some(text);
@@ -262,12 +262,7 @@ impl FeatureSimulator {
         noise: impl Fn(u64) -> Noise + Sync,
         stage: &Stage,
     ) -> Result<Array2<f64>, EstimatorError> {
-        let draw = |_, _, _| {
-            Ok(Some(Draw {
-                theta: theta.to_vec(),
-                drive: Cow::Borrowed(drive),
-            }))
-        };
+        let draw = |_, _, _| Ok(Some((theta.to_vec(), Cow::Borrowed(drive))));
         Ok(self.draws(0..size as u64, noise, draw, stage)?.features)
     }
 }
@@ -317,12 +312,7 @@ mod tests {
         simulator.draws(
             0..size as u64,
             |i| Noise::new(1, "bank", i),
-            |_, _, noise| {
-                Ok(Some(Draw {
-                    theta: space.draw_prior(noise),
-                    drive: Cow::Borrowed(&drive),
-                }))
-            },
+            |_, _, noise| Ok(Some((space.draw_prior(noise), Cow::Borrowed(&drive)))),
             &Progress::silent().stage("bank", size),
         )
     }

@@ -5,7 +5,7 @@
 //! Source of all but the box: Lakshminarayanan, Guerrero & Rojas, section IV-B.
 
 use super::EstimateRun;
-use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
+use crate::estimator::bank::{Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::RefinedEstimate;
 use crate::estimator::settings::CloudSampler;
@@ -143,10 +143,8 @@ impl EstimateRun<'_> {
             if attempt >= REDRAWS {
                 reflect(&mut theta, &space.bounds());
             }
-            Ok(space.check_point(&theta).is_ok().then_some(Draw {
-                theta,
-                drive: Cow::Borrowed(self.record.drive()),
-            }))
+            let is_inside = space.check_point(&theta).is_ok();
+            Ok(is_inside.then_some((theta, Cow::Borrowed(self.record.drive()))))
         };
         let noise = self.noise.child("cloud");
         simulator.draws(0..size as u64, |i| noise.sample(i), draw, &stage)

@@ -14,9 +14,8 @@ mod together;
 mod tracking;
 mod warnings;
 
-pub(crate) use outcome::Stages;
-pub use outcome::{Estimate, EstimateOptions, PointEstimate, Refit};
-pub(crate) use refit::Contributions;
+pub(crate) use outcome::{Contributions, Stages};
+pub use outcome::{Estimate, EstimateOptions, Refit};
 pub use together::Together;
 pub use tracking::Tracking;
 
@@ -25,7 +24,7 @@ use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::gate::{GateOutcome, GateTest};
 use crate::estimator::project::Steps;
-use crate::estimator::readout::Spread;
+use crate::estimator::readout::PointEstimate;
 use crate::estimator::refine::{RefinedEstimate, Refinement};
 use crate::estimator::settings::{GateForm, GateSettings, RefineSettings, Settings};
 use crate::progress::Progress;
@@ -146,9 +145,9 @@ impl Estimator {
     /// The network's estimate, with the errors of simulations of the prior that were predicted nearby.
     fn initial(&self, theta: Vec<f64>) -> PointEstimate {
         let space = self.study().twin().parameters();
-        let spread = self.calibration.spread(&theta, &space.widths());
-        let unknown = || Spread::normal(vec![f64::NAN; theta.len()]);
-        PointEstimate::new(theta.clone(), spread.unwrap_or_else(unknown), &space)
+        let estimate = (self.calibration).estimate(theta.clone(), &space.widths(), &space);
+        let unknown = vec![f64::NAN; theta.len()];
+        estimate.unwrap_or_else(|| PointEstimate::normal(theta, unknown, &space))
     }
 }
 
@@ -175,13 +174,9 @@ impl EstimateRun<'_> {
         settings: &'a RefineSettings,
     ) -> Refinement<'a> {
         Refinement {
-            simulator,
-            drive: self.record.drive(),
+            test: self.gate_test(simulator, &self.settings.gate, "refine"),
             observed,
             settings,
-            gate: &self.settings.gate,
-            noise: self.noise.child("refine"),
-            progress: self.progress,
         }
     }
 

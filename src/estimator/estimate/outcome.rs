@@ -1,16 +1,16 @@
 //! Options and results of an estimate.
 
-use super::refit::Contributions;
 use super::tracking::Tracking;
 use crate::estimator::bank::Draws;
 use crate::estimator::gate::GateOutcome;
 use crate::estimator::project::PresetName;
-use crate::estimator::readout::Spread;
+use crate::estimator::readout::PointEstimate;
 use crate::estimator::refine::FeatureInformation;
 use crate::fit::doubts::{DIVERGES, NO_BETTER};
 use crate::fit::{FittedNoise, Nuisance, Posterior, Warning};
 use crate::record::Record;
-use crate::twin::{ParameterSpace, Role};
+use crate::twin::Role;
+use serde::{Deserialize, Serialize};
 
 /// Options of an estimate.
 #[derive(Debug, Clone, Default)]
@@ -29,34 +29,6 @@ pub struct EstimateOptions {
     pub draws: usize,
 }
 
-/// Parameters with their errors.
-#[derive(Debug, Clone)]
-pub struct PointEstimate {
-    /// Values, within the bounds.
-    pub theta: Vec<f64>,
-    /// Standard errors.
-    pub std_error: Vec<f64>,
-    /// Lower ends of the 90 % interval, within the bounds.
-    pub low: Vec<f64>,
-    /// Upper ends.
-    pub high: Vec<f64>,
-}
-
-impl PointEstimate {
-    pub(super) fn new(theta: Vec<f64>, spread: Spread, space: &ParameterSpace) -> Self {
-        let shifted = |by: &[f64]| {
-            let moved: Vec<f64> = theta.iter().zip(by).map(|(t, b)| t + b).collect();
-            space.clamp(&moved)
-        };
-        Self {
-            low: shifted(&spread.low),
-            high: shifted(&spread.high),
-            std_error: spread.std_error,
-            theta,
-        }
-    }
-}
-
 /// Stages after the gate at the network's estimate.
 #[derive(Debug, Clone)]
 pub(crate) enum Stages {
@@ -65,6 +37,20 @@ pub(crate) enum Stages {
     Kept(Option<FeatureInformation>),
     /// The record was refitted.
     Refitted(Box<Refit>),
+}
+
+/// Contributions of the quadratic layer and the heads to a tuned estimate, by parameter; measured on draws that neither saw.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Contributions {
+    /// α, the share of what the heads say that holds; the layer alone has 0.
+    pub alpha: Vec<f64>,
+    /// Share of the cloud's variance that the layer alone explains.
+    pub layer: Vec<f64>,
+    /// The same of layer and heads.
+    pub both: Vec<f64>,
+    /// The layer's estimate alone, within the bounds.
+    pub theta: Vec<f64>,
 }
 
 /// Refit of a record: Gauss–Newton, cloud, tuned heads, the test again.

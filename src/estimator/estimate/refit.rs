@@ -1,11 +1,11 @@
 //! The refit of a record: Gauss–Newton, cloud, tuned heads, gate again.
 
 use super::EstimateRun;
-use super::outcome::{PointEstimate, Refit, RefitSeconds};
+use super::outcome::{Contributions, Refit, RefitSeconds};
 use crate::estimator::bank::{Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::readout::{
-    Calibration, QuadraticLayer, Readout, Scaler, Spread, Standardiser,
+    Calibration, PointEstimate, QuadraticLayer, Readout, Scaler, Standardiser,
 };
 use crate::estimator::refine::{RefinedEstimate, Refinement};
 use crate::fit::posterior::PosteriorRegion;
@@ -13,7 +13,6 @@ use crate::math::one_row;
 use crate::network::Training;
 use nalgebra::DVector;
 use ndarray::{Array2, Axis, s};
-use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
 
@@ -22,26 +21,12 @@ const LIMIT: f64 = 8.0;
 /// The tuned estimate is kept within this quantile of χ²_d: of its squared distance from the record's posterior, or of its whitened misfit.
 const KEEP_TUNED: f64 = 0.999;
 
-/// Contributions of the quadratic layer and the heads to a tuned estimate, by parameter; measured on draws that neither saw.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Contributions {
-    /// α, the share of what the heads say that holds; the layer alone has 0.
-    pub alpha: Vec<f64>,
-    /// Share of the cloud's variance that the layer alone explains.
-    pub layer: Vec<f64>,
-    /// The same of layer and heads.
-    pub both: Vec<f64>,
-    /// The layer's estimate alone, within the bounds.
-    pub theta: Vec<f64>,
-}
-
 /// Heads tuned to one record.
 struct Tuned {
     /// θ_fine, within the bounds.
     theta: Vec<f64>,
-    /// Errors to expect, measured on a part of the cloud that the heads never saw.
-    spread: Option<Spread>,
+    /// θ_fine with errors measured on a part of the cloud that the heads never saw.
+    answer: Option<PointEstimate>,
     /// `None` without a quadratic layer.
     contributions: Option<Contributions>,
 }
@@ -94,9 +79,9 @@ impl EstimateRun<'_> {
             ),
         };
         let space = simulator.twin().parameters();
-        let answer = match tuned.spread {
-            Some(spread) if keeps => PointEstimate::new(tuned.theta.clone(), spread, &space),
-            _ => PointEstimate::new(instead.clone(), Spread::normal(std_error), &space),
+        let answer = match tuned.answer {
+            Some(answer) if keeps => answer,
+            _ => PointEstimate::normal(instead.clone(), std_error, &space),
         };
         Ok(Refit {
             after: self.after(simulator, &answer.theta, &refined, &observed)?,
@@ -195,7 +180,7 @@ impl EstimateRun<'_> {
         });
         Ok(Tuned {
             contributions,
-            spread: calibration.spread(&theta, &readout.targets.scale),
+            answer: calibration.estimate(theta.clone(), &readout.targets.scale, &space),
             theta,
         })
     }

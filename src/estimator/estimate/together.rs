@@ -1,9 +1,9 @@
 //! Several records of one system: one estimate of what they share.
 
-use super::{Estimate, EstimateOptions, PointEstimate};
+use super::{Estimate, EstimateOptions};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
-use crate::estimator::readout::Spread;
+use crate::estimator::readout::PointEstimate;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::twin::{ParameterSpace, Role};
@@ -118,8 +118,7 @@ fn together(records: Vec<Estimate>, space: &ParameterSpace) -> Together {
     };
     let std_error: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
     let own = ParameterSpace::new(shared.iter().map(|&j| space[j].clone()));
-    let spread = Spread::normal(std_error);
-    let answer = PointEstimate::new(theta.as_slice().to_vec(), spread, &own);
+    let answer = PointEstimate::normal(theta.as_slice().to_vec(), std_error, &own);
     Together {
         names: own.names().into_iter().map(str::to_owned).collect(),
         theta: own.clamp(&answer.theta),

@@ -124,16 +124,6 @@ fn calibrated_after_a_refit(name: &str, features: &dyn FeatureRecipe, records: u
                 .remove(0)
                 .unwrap();
             let observed = DVector::from_vec(x);
-            let refinement = Refinement {
-                simulator: &simulator,
-                drive: &drive,
-                observed: &observed,
-                settings: &settings,
-                gate: &gate,
-                noise: noise.child("refine"),
-                progress: &Progress::silent(),
-            };
-            let refined = refinement.run(&space.centre()).unwrap();
             let test = GateTest {
                 simulator: &simulator,
                 drive: &drive,
@@ -141,6 +131,15 @@ fn calibrated_after_a_refit(name: &str, features: &dyn FeatureRecipe, records: u
                 noise: noise.child("after"),
                 progress: &Progress::silent(),
             };
+            let refinement = Refinement {
+                test: GateTest {
+                    noise: noise.child("refine"),
+                    ..test
+                },
+                observed: &observed,
+                settings: &settings,
+            };
+            let refined = refinement.run(&space.centre()).unwrap();
             let after = test.after_refit(refined.theta.as_slice(), &refined.jacobian, &observed);
             after.unwrap().unwrap().out_of_distribution
         })

@@ -252,7 +252,9 @@ impl Pretraining {
         path: &Path,
         progress: &Progress,
     ) -> Result<(Estimator, History), EstimatorError> {
-        let manifest = self.manifest()?;
+        // What the network cannot take is said before anything is simulated.
+        let plan = PretrainPlan::new(&self.project, self.sized())?;
+        let manifest = self.manifest(&plan.settings)?;
         let place = beside(path);
         sweep_beside(path);
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
@@ -261,7 +263,7 @@ impl Pretraining {
         }
         let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(()))?;
         let lock = folder.lock()?;
-        let made = self.made(&folder, progress).and_then(|made| {
+        let made = self.made(plan, &folder, progress).and_then(|made| {
             made.0.save_again(path)?;
             Ok(made)
         });
@@ -278,12 +280,11 @@ impl Pretraining {
     /// The estimator, by what is in the folder and what is still to be done.
     fn made(
         &self,
+        plan: PretrainPlan<'_>,
         folder: &WorkFolder,
         progress: &Progress,
     ) -> Result<(Estimator, History), EstimatorError> {
         let checkpoints = Checkpoints::new(folder.file(TRAINING), self.every);
-        // What the network cannot take is said before anything is simulated.
-        let plan = PretrainPlan::new(&self.project, self.sized())?;
         let simulated;
         let bank = match &self.bank {
             Some((bank, _)) => &**bank,
@@ -314,9 +315,8 @@ impl Pretraining {
     }
 
     /// Everything that the estimator depends on.
-    fn manifest(&self) -> Result<Manifest, EstimatorError> {
+    fn manifest(&self, settings: &Settings) -> Result<Manifest, EstimatorError> {
         let preset = self.project.recipe(self.options.preset);
-        let settings = PretrainPlan::new(&self.project, self.sized())?.settings;
         let bank = match &self.bank {
             Some((_, checksum)) => checksum.clone(),
             None => "simulated".into(),

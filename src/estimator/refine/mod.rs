@@ -15,14 +15,12 @@ mod information;
 
 pub(crate) use information::FeatureInformation;
 
-use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
-use crate::estimator::gate::whiten;
-use crate::estimator::settings::{GateSettings, RefineSettings};
+use crate::estimator::gate::{GateTest, whiten};
+use crate::estimator::settings::RefineSettings;
 use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem, space_filling};
 use crate::math::{MathError, Stencil, Whitening};
-use crate::progress::{Progress, Stage};
-use crate::record::Drive;
+use crate::progress::Stage;
 use crate::twin::{Interval, Noise};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -72,20 +70,12 @@ fn is_fatal(error: &EstimatorError) -> bool {
 
 /// Record, simulator and settings of a refinement.
 pub struct Refinement<'a> {
-    /// Twin and features.
-    pub simulator: &'a FeatureSimulator,
-    /// The record's input.
-    pub drive: &'a Drive,
+    /// Simulator, the record's input, whitening and noise.
+    pub test: GateTest<'a>,
     /// The record's features.
     pub observed: &'a DVector<f64>,
     /// Settings.
     pub settings: &'a RefineSettings,
-    /// Whitening of the features.
-    pub gate: &'a GateSettings,
-    /// Randomness.
-    pub noise: Noise,
-    /// Progress sink, asked at every simulation.
-    pub progress: &'a Progress,
 }
 
 /// A θ, and the features simulated there.
@@ -100,7 +90,7 @@ impl Refinement<'_> {
     pub fn run(&self, initial: &[f64]) -> Result<RefinedEstimate, EstimatorError> {
         let settings = self.settings;
         let steps = settings.starts + settings.rounds;
-        let stage = self.progress.stage("Gauss–Newton", steps);
+        let stage = self.test.progress.stage("Gauss–Newton", steps);
         let features = self.mean_features(initial, settings.seeds)?;
         let local = match (settings.starts, settings.rounds) {
             // Nothing to choose from, and little way to go.
@@ -138,7 +128,7 @@ impl Refinement<'_> {
 
     /// f̄ of so many runs, beside θ_init.
     fn mean_features(&self, initial: &[f64], seeds: usize) -> Result<MeanFeatures<'_>, MathError> {
-        let space = self.simulator.twin().parameters();
+        let space = self.test.simulator.twin().parameters();
         let side = |end: fn(Interval) -> f64| {
             DVector::from_iterator(space.len(), space.iter().map(|p| end(p.bounds)))
         };
@@ -232,13 +222,11 @@ impl Refinement<'_> {
 
     /// S at `theta`, from the same noise everywhere.
     fn whiten(&self, theta: DVector<f64>) -> Result<Local, EstimatorError> {
-        let size = self.gate.whitening_simulations(self.simulator.dim());
-        let noise = self.noise.child("whitening");
-        let stage = self.progress.unshown().stage("whitening", 0);
-        let sample = |i| noise.sample(i);
-        let features =
-            (self.simulator).repeat(theta.as_slice(), self.drive, size, sample, &stage)?;
-        let whitening = whiten(self.gate, &features)?;
+        let test = &self.test;
+        let size = test.settings.whitening_simulations(test.simulator.dim());
+        let stage = test.progress.unshown().stage("whitening", 0);
+        let features = test.repeat(theta.as_slice(), size, "whitening", &stage)?;
+        let whitening = whiten(test.settings, &features)?;
         let squares = whitening.squared_distances(&features);
         Ok(Local {
             theta,
@@ -263,7 +251,7 @@ impl Refinement<'_> {
         let residual = whitening.apply(&(mean - self.observed));
         let information = FeatureInformation::new(
             &whitening.apply_columns(&jacobian),
-            &self.simulator.twin().parameters(),
+            &self.test.simulator.twin().parameters(),
             self.settings.ridge,
             self.settings.seeds,
         )?;
@@ -310,17 +298,21 @@ struct MeanFeatures<'a> {
 
 impl MeanFeatures<'_> {
     fn noise(&self, seed: u64) -> Noise {
-        self.refinement.noise.child("mean features").sample(seed)
+        self.refinement
+            .test
+            .noise
+            .child("mean features")
+            .sample(seed)
     }
 
     /// f̄(θ).
     fn at(&self, theta: &[f64]) -> Result<DVector<f64>, MathError> {
-        let &Refinement {
+        let &GateTest {
             simulator,
             drive,
             progress,
             ..
-        } = self.refinement;
+        } = &self.refinement.test;
         progress.checkpoint().map_err(MathError::fatal)?;
         Ok(simulator.mean_features(theta, drive, |seed| self.noise(seed), self.seeds)?)
     }
@@ -334,12 +326,12 @@ impl MeanFeatures<'_> {
     /// ∂f/∂θ of each seed by itself.
     fn jacobians(&self, theta: &DVector<f64>) -> Result<Vec<DMatrix<f64>>, MathError> {
         let stencil = self.stencil(theta)?;
-        let &Refinement {
+        let &GateTest {
             simulator,
             drive,
             progress,
             ..
-        } = self.refinement;
+        } = &self.refinement.test;
         let one = |seed: u64| {
             progress.checkpoint().map_err(MathError::fatal)?;
             let all: Vec<_> = (stencil.points().iter())

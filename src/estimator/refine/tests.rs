@@ -1,6 +1,6 @@
 //! The refinement finds the parameter of a record.
 
-use super::{RefineSettings, Refinement};
+use super::{GateTest, RefineSettings, Refinement};
 use crate::estimator::GateSettings;
 use crate::estimator::bank::FeatureSimulator;
 use crate::feature::Ar;
@@ -22,13 +22,15 @@ fn one_start_comes_near_the_truth() {
         ..RefineSettings::default()
     };
     let refinement = Refinement {
-        simulator: &simulator,
-        drive: &drive,
+        test: GateTest {
+            simulator: &simulator,
+            drive: &drive,
+            settings: &GateSettings::default(),
+            noise: Noise::new(1, "refine", 0),
+            progress: &Progress::silent(),
+        },
         observed: &observed,
         settings: &few,
-        gate: &GateSettings::default(),
-        noise: Noise::new(1, "refine", 0),
-        progress: &Progress::silent(),
     };
     let refined = refinement.run(&[1.2]).unwrap();
     assert!((refined.theta[0] - 1.5).abs() < 0.5);

@@ -2,7 +2,7 @@
 
 use super::regression::regress;
 use super::{FeatureError, FeatureMap, FeatureRecipe, check_long, check_varies};
-use crate::math::{Lagged, LaggedSignals, LeastSquares, MathError, Regressors, one_column};
+use crate::math::{Lagged, LaggedSignals, LeastSquares, MathError, Regressors};
 use crate::record::{Drive, Signal};
 use crate::twin::Twin;
 use nalgebra::DMatrix;
@@ -216,11 +216,10 @@ impl<'a> ArmaxSeries<'a> {
         let long = self.orders.long(self.y.len());
         let fit = regress(lagged(self.y, long, self.inputs, long), long)?;
         let mut innovations = vec![0.0; long];
-        innovations.extend(fit.residual.iter());
+        innovations.extend(fit.residual);
         let mut signals = lagged(self.y, p, self.inputs, q);
         signals.push(Lagged::new(innovations, r));
-        let fit = regress(signals, long + r)?;
-        let mut theta = fit.coefficients.as_slice().to_vec();
+        let mut theta = regress(signals, long + r)?.coefficients;
         make_invertible(&mut theta[self.orders.coefficients() - r..]);
         Ok(theta)
     }
@@ -266,9 +265,8 @@ impl<'a> ArmaxSeries<'a> {
             }
         }
         let (gram, psi) = (&psi * psi.transpose(), psi.transpose());
-        let target = one_column(&residuals[start..]);
-        let fit = LeastSquares::with_ridge(&psi, &gram, RIDGE)?.solve(&target)?;
-        Ok(fit.coefficients.as_slice().to_vec())
+        let fit = LeastSquares::with_ridge(&psi, &gram, RIDGE)?.solve(&residuals[start..])?;
+        Ok(fit.coefficients)
     }
 }
 

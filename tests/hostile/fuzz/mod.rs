@@ -136,7 +136,13 @@ fn seeds_that_are_not_text() {
     estimator.save(&new("estimator/tiny.est")).unwrap();
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("bank");
-    banks::fill(project, 20, &folder).unwrap();
+    let plan = banks::BankPlan {
+        project,
+        preset: PresetName::Default,
+        size: 20,
+        seed: 1,
+    };
+    (plan.fill(&folder, banks::Share::WHOLE, &Progress::silent())).unwrap();
     let mut text = std::fs::read_to_string(folder.join("manifest.json")).unwrap();
     text.push_str(readers::NAMES);
     for entry in std::fs::read_dir(folder.join("shards")).unwrap() {

@@ -13,9 +13,11 @@ use truetwin::effect::{Catalogue, augment};
 use truetwin::estimator::Estimator;
 use truetwin::estimator::Project;
 use truetwin::evaluate::paper::reference_projects;
-use truetwin::fuzzing::{banks, programs as program, runs, work};
+use truetwin::fuzzing::banks::{self, Bank as _};
+use truetwin::fuzzing::{programs as program, runs, work};
 use truetwin::network::HeadArchitecture;
 use truetwin::network::layers::*;
+use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record};
 use truetwin::study::{RecordPlan, Study, StudyFile};
 use truetwin::twins::VanDerPol;
@@ -183,11 +185,14 @@ pub fn manifest(data: &[u8]) -> Result<(), String> {
     let from = [folder.clone()];
     let out = place().join("merged");
     let _ = fs::remove_dir_all(&out);
-    hold_message("manifest", banks::merged(&from, &out));
+    let silent = Progress::silent();
+    hold_message("manifest", banks::merge(&from, &out, &silent));
     let table = place().join("merged.csv");
-    hold_message("manifest", banks::merged_into_file(&from, &table));
-    for part in banks::parts(&folder).map_err(text)? {
-        hold_message("manifest", part);
+    let merged = banks::merge_into_file(&from, &table, &silent);
+    hold_message("manifest", merged);
+    let bank = banks::ShardedBank::open(&folder).map_err(text)?;
+    for part in 0..bank.parts().len().min(3) {
+        hold_message("manifest", bank.part(part));
     }
     Ok(())
 }
@@ -218,7 +223,7 @@ pub fn bank(data: &[u8]) -> Result<(), String> {
         [0x93, b'N', ..] => file("bank.npz", &archive(data)),
         _ => file("bank.csv", data),
     };
-    banks::read(&path, &["a", "b"]).map_err(text)
+    banks::read(&path, &["a", "b"]).map(|_| ()).map_err(text)
 }
 
 /// An archive with sound `theta` and these bytes as `features`.
@@ -248,7 +253,12 @@ pub fn npy(numbers: [f64; 4]) -> Vec<u8> {
 pub fn write_bank(path: &Path) {
     let theta = array![[1.0, 2.0], [3.0, 4.0]];
     let features = array![[0.5, 0.25, 1.0], [1e-9, -3.0, 7.0]];
-    banks::write(path, theta, features, &["a", "b"]).expect("a new file");
+    let draws = banks::Draws {
+        theta,
+        features,
+        redrawn: 0,
+    };
+    banks::write(path, &draws, &["a", "b"]).expect("a new file");
 }
 
 /// A line, as a worker hands it on.
