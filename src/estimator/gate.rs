@@ -11,6 +11,7 @@
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-A.
 
 use crate::estimator::bank::{Draws, FeatureSimulator};
+use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::settings::{GateForm, GateSettings};
 use crate::math::{Whitening, median, quantile, rank_p_value, to_vector};
@@ -21,9 +22,6 @@ use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView1};
 use serde::Serialize;
 use std::borrow::Cow;
-
-/// Monte-Carlo errors between p-value and level that leave the answer to chance in fewer than 1 of 20 cases.
-const UNSURE: f64 = 2.0;
 
 /// The test's answer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -51,7 +49,7 @@ impl GateOutcome {
 
     /// Returns whether other random numbers could well turn the answer.
     pub(super) fn is_unsure(&self) -> bool {
-        (self.p_value - self.alpha).abs() < UNSURE * self.p_error
+        (self.p_value - self.alpha).abs() < BUDGET.unsure * self.p_error
     }
 }
 

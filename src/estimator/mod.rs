@@ -36,6 +36,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod budget;
 mod error;
 mod estimate;
 #[allow(clippy::module_inception)]

@@ -140,20 +140,15 @@ impl Project {
         let twin = self.study.twin();
         let map = recipe.features.bind(twin)?;
         let noise = Noise::new(seed, "check features", 0);
-        let most = recipe.architecture.max_features();
         let features = (twin.simulate(&twin.parameters().centre(), drive, noise))
             .map_err(|error| error.to_string())
             .and_then(|y| map.extract(drive, &y).map_err(|error| error.to_string()));
         let (severity, message) = match features {
             Err(error) => (Severity::Failure, error),
-            Ok(x) if x.len() > most => {
-                let (n, id) = (x.len(), recipe.architecture.id());
-                let problem = format!(
-                    "{n} features, network \"{id}\" takes at most {most}; lower their order"
-                );
-                (Severity::Failure, problem)
-            }
-            Ok(x) => (Severity::Pass, format!("{} features of a record", x.len())),
+            Ok(x) => match recipe.check_width(x.len()) {
+                Err(problem) => (Severity::Failure, problem),
+                Ok(()) => (Severity::Pass, format!("{} features of a record", x.len())),
+            },
         };
         Ok(Finding {
             check: "features",
@@ -206,6 +201,17 @@ impl Recipe {
             features,
             architecture: architecture::<Deep>(),
             settings: Settings::default(),
+        }
+    }
+
+    /// Checks that the network takes so many features.
+    pub(super) fn check_width(&self, features: usize) -> Result<(), String> {
+        let (id, most) = (self.architecture.id(), self.architecture.max_features());
+        match features <= most {
+            true => Ok(()),
+            false => Err(format!(
+                "{features} features, network \"{id}\" takes at most {most}; lower their order"
+            )),
         }
     }
 }

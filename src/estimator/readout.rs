@@ -1,5 +1,6 @@
 //! From features to parameters: the network, and what stands around it.
 
+use crate::estimator::budget::BUDGET;
 use crate::math::{MathError, Whitening, quantile, to_array, to_matrix};
 use crate::network::{Network, NetworkError};
 use crate::twin::ParameterSpace;
@@ -9,10 +10,6 @@ use std::sync::Arc;
 
 /// Level of the intervals given with an estimate.
 pub const INTERVAL_LEVEL: f64 = 0.9;
-/// Neighbours of a prediction whose errors are taken as its own.
-const NEIGHBOURS: usize = 100;
-/// Weight of a row of zeros in the ridge regression of the quadratic layer.
-const RIDGE: f64 = 1.0;
 
 /// Features → θ: standardised inputs z, a network, standardised targets, and, unless the settings say otherwise, a quadratic
 /// layer beside the network's heads.
@@ -198,7 +195,7 @@ pub struct QuadraticLayer {
 impl QuadraticLayer {
     /// Fits inputs z to standardised targets; `None` where numbers are not finite.
     pub fn fit(z: &Array2<f64>, targets: &Array2<f64>) -> Option<Self> {
-        let quadratic = Quadratic::fit(z, targets, RIDGE)?;
+        let quadratic = Quadratic::fit(z, targets, BUDGET.layer_ridge)?;
         Some(Self {
             residual: Scaler::fit(&(targets - &quadratic.predict(z))).scale,
             weight: vec![1.0; targets.ncols()],
@@ -309,7 +306,7 @@ impl Calibration {
             .map(|i| (distance(i), i))
             .collect();
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0));
-        nearest.truncate(NEIGHBOURS);
+        nearest.truncate(BUDGET.neighbours);
         nearest.into_iter().map(|(_, i)| i).collect()
     }
 

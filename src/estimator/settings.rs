@@ -1,15 +1,12 @@
 //! Settings of training and refinement.
 
+use crate::estimator::budget::BUDGET;
 use crate::network::{Schedule, Training};
 use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 
 /// Most simulations of a bank.
 pub(super) const MOST_SIMULATIONS: usize = 1_000_000_000_000;
-/// Simulations of the test of an unsure answer, over those of the first: they halve its Monte-Carlo error.
-const MORE: usize = 4;
-/// Iterations about features that were centred on the record.
-const CENTRED_ITERATIONS: u64 = 3;
 
 /// Map from features to network inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -178,9 +175,9 @@ impl GateSettings {
     /// The settings of a test that is four times as large.
     pub(super) fn larger(&self) -> Self {
         Self {
-            simulations: MORE * self.simulations,
-            per_feature: MORE * self.per_feature,
-            null: MORE * (self.null + 1) - 1,
+            simulations: BUDGET.larger_test * self.simulations,
+            per_feature: BUDGET.larger_test * self.per_feature,
+            null: BUDGET.larger_test * (self.null + 1) - 1,
             ..self.clone()
         }
     }
@@ -248,7 +245,7 @@ impl RefineSettings {
         Self {
             starts: 1,
             rounds: 1,
-            iterations: self.iterations.min(CENTRED_ITERATIONS),
+            iterations: self.iterations.min(BUDGET.centred_iterations),
             seeds: self.centred_seeds.min(self.seeds),
             ..self.clone()
         }

@@ -279,10 +279,10 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
         Ratchet::new("public items", 153, items.collect()),
         Ratchet::new("error types", 13, errors),
         Ratchet::new("lines of code", 50_000, lines),
-        Ratchet::new("files", 480, files.collect()),
+        Ratchet::new("files", 453, files.collect()),
         Ratchet::new("hidden items", 3, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 452, constants(sources)),
+        Ratchet::new("named numeric constants", 427, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             7,

@@ -1,6 +1,7 @@
 //! A twin seen through its features, and many simulations of it, row by row.
 
 use super::{Draw, Draws};
+use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
 use crate::progress::Stage;
@@ -13,11 +14,6 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// Failures of one sample before the draws count as hopeless; a twin that fails nine times in ten passes.
-const ATTEMPTS: usize = 200;
-/// Share of failed draws beyond which the work stops.
-const HOPELESS: f64 = 0.9;
 
 /// A twin seen through its features; counts every simulation, also those that the features make.
 #[derive(Clone)]
@@ -189,7 +185,7 @@ impl FeatureSimulator {
         let rows: Vec<DrawnRow> = chunks.into_iter().flatten().collect();
         let failed: usize = rows.iter().map(|row| row.failed).sum();
         let tried = rows.len() + failed;
-        if failed as f64 > HOPELESS * tried as f64 {
+        if failed as f64 > BUDGET.hopeless * tried as f64 {
             let reason = rows.into_iter().rev().find_map(|row| row.reason);
             return Err(EstimatorError::Hopeless {
                 failed,
@@ -219,7 +215,7 @@ impl FeatureSimulator {
             let missing = rows.iter_mut().zip(numbers);
             for (row, &number) in missing.filter(|(row, _)| row.drawn.is_none()) {
                 let attempt = row.rejected + row.failed;
-                if row.failed.max(row.rejected) >= ATTEMPTS {
+                if row.failed.max(row.rejected) >= BUDGET.attempts {
                     return Err(EstimatorError::Hopeless {
                         failed: attempt,
                         tried: attempt,

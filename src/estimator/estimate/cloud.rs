@@ -6,6 +6,7 @@
 
 use super::EstimateRun;
 use crate::estimator::bank::{Draws, FeatureSimulator};
+use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::RefinedEstimate;
 use crate::estimator::settings::CloudSampler;
@@ -14,15 +15,6 @@ use crate::math::{MathError, median, principal_axes};
 use crate::twin::{Interval, Noise, Parameter, ParameterSpace};
 use nalgebra::{DMatrix, DVector};
 use std::borrow::Cow;
-
-/// Half-width of the box, in standard deviations of a cloud of spread 1.
-const BOX_REACH: f64 = 1.8;
-/// Draws out of bounds before a draw is reflected at them: where the estimate lies in a corner of many dimensions, hardly
-/// any draw falls inside by itself.
-const REDRAWS: usize = 10;
-/// Part of the cloud that is simulated beyond M_FT, to measure the error of the tuned heads, and its least size.
-const CALIBRATION_SHARE: usize = 5;
-const CALIBRATION: usize = 200;
 
 /// Draws parameters around an estimate: draw number i depends on i and on its noise alone. Bounds are ignored: the cloud rejects
 /// draws outside, draws again with other noise, and counts them.
@@ -114,7 +106,7 @@ fn in_box(centre: &[f64], axes: &DMatrix<f64>, spread: f64) -> Sampler {
     Box::new(move |_, noise| {
         let mut source = noise.source("box");
         let u = DVector::from_fn(centre.len(), |_, _| {
-            BOX_REACH * spread * (2.0 * source.uniform() - 1.0)
+            BUDGET.box_reach * spread * (2.0 * source.uniform() - 1.0)
         });
         &centre + &axes * u
     })
@@ -136,11 +128,11 @@ impl EstimateRun<'_> {
             None => sampler(settings.sampler, refined, &space, spread)?,
         };
         let size = settings.draws(space.len());
-        let size = size + (size / CALIBRATION_SHARE).max(CALIBRATION);
+        let size = size + (size / BUDGET.cloud_calibration).max(BUDGET.least_cloud_calibration);
         let stage = self.progress.stage("cloud", size);
         let draw = |i, attempt, noise| {
             let mut theta = sampler(i, noise).as_slice().to_vec();
-            if attempt >= REDRAWS {
+            if attempt >= BUDGET.redraws {
                 reflect(&mut theta, &space.bounds());
             }
             let is_inside = space.check_point(&theta).is_ok();
@@ -193,7 +185,7 @@ mod tests {
     #[test]
     fn covariance_of_the_box_follows_the_axes() {
         let axes = DMatrix::from_row_slice(2, 2, &[2.0, -0.5, 1.0, 1.0]);
-        let (n, sampler) = (6000, in_box(&[0.0; 2], &axes, 3.0 / BOX_REACH));
+        let (n, sampler) = (6000, in_box(&[0.0; 2], &axes, 3.0 / BUDGET.box_reach));
         let mut covariance = DMatrix::zeros(2, 2);
         for theta in draws(&sampler, n) {
             covariance += &theta * theta.transpose() / n as f64;

@@ -1,6 +1,7 @@
 //! Fit of a record by its likelihood: noise levels that it shows, and the region where it puts θ.
 
 use super::outcome::EstimateOptions;
+use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::fit::{Fit, FitSettings, FittedNoise};
 use crate::likelihood::{likelihood_of, with_levels};
@@ -9,15 +10,6 @@ use crate::record::{Drive, Record, Signal, Signals};
 use crate::study::{Study, StudyError};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError, Twin};
 use std::collections::BTreeMap;
-
-/// Standard errors of ln σ that a fitted level lies off the declared one before it takes its place: by chance in 3 of 1000. At two of
-/// them every twentieth level of a right twin would; at six a sensor twice as loud as declared goes unseen in 50 samples.
-const OFF: f64 = 3.0;
-/// Least factor between the two: less changes no interval by more than a fifth, however sure it is.
-const FACTOR: f64 = 1.2;
-
-/// Draws of the noise levels for the tests: their spread is then known to an eighth.
-const DRAWS: u64 = 32;
 
 /// Fit of a record, and the twin in the noise that it shows.
 pub(super) struct RecordFit {
@@ -88,7 +80,11 @@ impl RecordFit {
         // A fitted level where none is declared may be no more than a floor, and hides what an exact twin would show.
         let is_declared = |level: &&FittedNoise| level.declared.is_some() && level.value > 0.0;
         let declared: Vec<&FittedNoise> = fit.noise.iter().filter(is_declared).collect();
-        let draws = if declared.is_empty() { 1 } else { DRAWS };
+        let draws = if declared.is_empty() {
+            1
+        } else {
+            BUDGET.level_draws
+        };
         let drawn = (0..draws).map(|draw| {
             let mut source = Noise::new(options.seed, "levels", draw).source("normal");
             let levels = declared.iter().map(|level| {
@@ -110,6 +106,7 @@ impl RecordFit {
 fn is_off(level: &FittedNoise) -> bool {
     level.declared.is_some_and(|declared| {
         let distance = (level.value / declared).ln().abs();
-        distance > FACTOR.ln() && distance > OFF * level.std_error / level.value
+        distance > BUDGET.level_factor.ln()
+            && distance > BUDGET.level_off * level.std_error / level.value
     })
 }

@@ -3,6 +3,7 @@
 use super::EstimateRun;
 use super::outcome::{Contributions, Refit, RefitSeconds};
 use crate::estimator::bank::{Draws, FeatureSimulator};
+use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::readout::{
     Calibration, PointEstimate, QuadraticLayer, Readout, Scaler, Standardiser,
@@ -15,11 +16,6 @@ use nalgebra::DVector;
 use ndarray::{Array2, Axis, s};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
-
-/// Largest network input, in standard deviations of the cloud.
-const LIMIT: f64 = 8.0;
-/// The tuned estimate is kept within this quantile of χ²_d: of its squared distance from the record's posterior, or of its whitened misfit.
-const KEEP_TUNED: f64 = 0.999;
 
 /// Heads tuned to one record.
 struct Tuned {
@@ -96,6 +92,7 @@ impl EstimateRun<'_> {
             seconds,
         })
     }
+
     /// Tunes the heads on a cloud, the trunk frozen, and reads the record's features with them.
     ///
     /// Each target's weight is w_j = d·G_jj/Σ G_kk, with G in the units that the targets are standardised in.
@@ -116,7 +113,7 @@ impl EstimateRun<'_> {
         // constant, and the heads learn little.
         let (inputs, targets) = match settings.cloud.rescale {
             true => {
-                let inputs = Standardiser::principal(&features, LIMIT);
+                let inputs = Standardiser::principal(&features, BUDGET.largest_tuned_input);
                 let inputs = inputs.unwrap_or_else(|_| Standardiser::each(&features));
                 (inputs, Scaler::fit(&theta))
             }
@@ -196,7 +193,7 @@ fn keeps(refinement: &Refinement<'_>, refined: &RefinedEstimate, theta: &[f64]) 
 
 /// Returns whether a squared distance of this many degrees of freedom is one of chance.
 fn is_likely(square: f64, freedom: usize) -> bool {
-    ChiSquared::new(freedom as f64).is_ok_and(|chi| square <= chi.inverse_cdf(KEEP_TUNED))
+    ChiSquared::new(freedom as f64).is_ok_and(|chi| square <= chi.inverse_cdf(BUDGET.keep_tuned))
 }
 
 /// Share of each column's variance that a prediction explains.

@@ -1,20 +1,14 @@
 //! The calibrated twin beside the record: its free run, and a comparison of two answers by run and likelihood.
 
+use crate::estimator::budget::BUDGET;
 use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem};
 use crate::likelihood::likelihood_of;
 use crate::math::{MathError, Stencil};
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Interval, Noise, ParameterSpace, Role, Twin};
+use crate::twin::{DigitalTwin, Noise, Role, Twin};
 use nalgebra::{DMatrix, DVector};
 use ndarray::Array1;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-/// Ratio of free-run errors from which on the twin's own records are asked: few answers pay for them.
-const LARGER: f64 = 1.2;
-/// Records of the twin itself that a free run's error is compared with: by chance, one in twenty lies beyond all.
-const OWN_RECORDS: u64 = 19;
-/// Probability that the likelihood at the truth lies so far below its top.
-const BY_CHANCE: f64 = 0.1;
 
 /// A free run beside a record.
 #[derive(Debug, Clone)]
@@ -38,36 +32,33 @@ pub(super) fn track(
     let starts: Vec<usize> = (0..space.len())
         .filter(|&j| space[j].role == Role::Start)
         .collect();
+    let of = |value: &dyn Fn(usize) -> f64| {
+        DVector::from_iterator(starts.len(), starts.iter().map(|&j| value(j)))
+    };
+    let begin = of(&|j| theta[j]);
+    let problem = StartFit {
+        twin,
+        theta,
+        record,
+        widths: of(&|j| space[j].prior.width()),
+        bounds: Bounds::new(
+            of(&|j| space[j].bounds.low()),
+            of(&|j| space[j].bounds.high()),
+        )?,
+        starts,
+    };
     let mut fitted = theta.to_vec();
-    if !starts.is_empty() {
-        let problem = StartFit {
-            twin,
-            space: &space,
-            theta,
-            record,
-            starts: &starts,
-        };
-        let at = |of: fn(Interval) -> f64| -> DVector<f64> {
-            DVector::from_iterator(starts.len(), starts.iter().map(|&j| of(space[j].bounds)))
-        };
-        let bounds = Bounds::new(at(Interval::low), at(Interval::high))
-            .map_err(|error| MathError::Fatal(error.into()))?;
-        let begin = DVector::from_iterator(starts.len(), starts.iter().map(|&j| theta[j]));
-        let scale =
-            DVector::from_iterator(starts.len(), starts.iter().map(|&j| space[j].prior.width()));
-        let minimum = GaussNewton::default().minimise(&problem, &begin, &bounds, &scale)?;
-        for (&j, value) in starts.iter().zip(minimum.theta.iter()) {
-            fitted[j] = *value;
-        }
+    if !problem.starts.is_empty() {
+        let StartFit { bounds, widths, .. } = &problem;
+        let minimum = GaussNewton::default().minimise(&problem, &begin, bounds, widths)?;
+        fitted = problem.with(&minimum.theta);
     }
     let outputs = twin
         .free_run(&fitted, record.drive())
         .map_err(|error| MathError::Start(error.into()))?;
     let errors = record.outputs() - &outputs;
-    let squares: Array1<f64> = (errors.iter())
-        .filter(|d| !d.is_nan())
-        .map(|d| d * d)
-        .collect();
+    let errors = errors.iter().filter(|d| !d.is_nan());
+    let squares: Array1<f64> = errors.map(|d| d * d).collect();
     Ok(Tracking {
         rmse: squares.mean().unwrap_or(0.0).sqrt(),
         outputs,
@@ -78,10 +69,24 @@ pub(super) fn track(
 /// Residuals of the free run as a function of the unknown starts.
 struct StartFit<'a> {
     twin: &'a dyn DigitalTwin,
-    space: &'a ParameterSpace,
     theta: &'a [f64],
     record: &'a Record,
-    starts: &'a [usize],
+    /// Their places in θ.
+    starts: Vec<usize>,
+    /// Their bounds, and the widths of their priors.
+    bounds: Bounds,
+    widths: DVector<f64>,
+}
+
+impl StartFit<'_> {
+    /// θ with these starts.
+    fn with(&self, starts: &DVector<f64>) -> Vec<f64> {
+        let mut theta = self.theta.to_vec();
+        for (&j, value) in self.starts.iter().zip(starts.iter()) {
+            theta[j] = *value;
+        }
+        theta
+    }
 }
 
 impl ResidualProblem for StartFit<'_> {
@@ -90,11 +95,8 @@ impl ResidualProblem for StartFit<'_> {
     }
 
     fn residual(&self, starts: &DVector<f64>) -> Result<DVector<f64>, MathError> {
-        let mut theta = self.theta.to_vec();
-        for (&j, value) in self.starts.iter().zip(starts.iter()) {
-            theta[j] = *value;
-        }
-        let run = (self.twin.free_run(&theta, self.record.drive())).map_err(MathError::rejected)?;
+        let run = self.twin.free_run(&self.with(starts), self.record.drive());
+        let run = run.map_err(MathError::rejected)?;
         let rows = (self.record.outputs().iter().zip(&run))
             .filter(|(y, _)| !y.is_nan())
             .map(|(y, f)| f - y);
@@ -102,16 +104,10 @@ impl ResidualProblem for StartFit<'_> {
     }
 
     fn jacobian(&self, starts: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
-        let of = |value: fn(&crate::twin::Parameter) -> f64| -> Vec<f64> {
-            self.starts.iter().map(|&j| value(&self.space[j])).collect()
-        };
-        let stencil = Stencil::new(
-            starts.as_slice(),
-            &of(|p| 1e-4 * p.prior.width()),
-            &of(|p| p.bounds.low()),
-            &of(|p| p.bounds.high()),
-        )
-        .map_err(MathError::fatal)?;
+        let steps = 1e-4 * &self.widths;
+        let [low, high] = [self.bounds.lower(), self.bounds.upper()].map(DVector::as_slice);
+        let stencil = Stencil::new(starts.as_slice(), steps.as_slice(), low, high)
+            .map_err(MathError::fatal)?;
         stencil.jacobian(|point| self.residual(&DVector::from_column_slice(point)))
     }
 }
@@ -162,7 +158,7 @@ impl Agreement {
         by_chance: impl FnOnce() -> Option<f64>,
     ) -> bool {
         let chance = ChiSquared::new(parameters as f64)
-            .map_or(0.0, |chi| 0.5 * chi.inverse_cdf(1.0 - BY_CHANCE));
+            .map_or(0.0, |chi| 0.5 * chi.inverse_cdf(1.0 - BUDGET.less_likely));
         let less_likely = match (self.log_likelihood, first.log_likelihood) {
             (Some(own), Some(first)) => own + chance < first,
             (None, Some(_)) => first.rmse.is_some(),
@@ -171,7 +167,8 @@ impl Agreement {
         less_likely
             || match (self.rmse, first.rmse) {
                 (Some(own), Some(first)) => {
-                    own > LARGER * first && by_chance().is_none_or(|chance| own > chance)
+                    own > BUDGET.larger_error * first
+                        && by_chance().is_none_or(|chance| own > chance)
                 }
                 (None, Some(_)) => true,
                 _ => false,
@@ -179,10 +176,10 @@ impl Agreement {
     }
 }
 
-/// Largest free-run error of [`OWN_RECORDS`] records that `twin` makes at `theta` under the record's input; `None` where one fails.
+/// Largest free-run error of the records that `twin` makes at `theta` under the record's input; `None` where one fails.
 fn error_by_chance(twin: &Twin, theta: &[f64], record: &Record, noise: Noise) -> Option<f64> {
     let drive = record.drive();
-    let errors = (0..OWN_RECORDS).map(|i| {
+    let errors = (0..BUDGET.own_records).map(|i| {
         let outputs = twin.simulate(theta, drive, noise.sample(i)).ok()?;
         let own = Record::new(drive.clone(), outputs).ok()?;
         Some(track(twin, theta, &own).ok()?.rmse)

@@ -1,6 +1,7 @@
 //! Reasons to doubt an estimate.
 
 use super::outcome::Estimate;
+use crate::estimator::budget::BUDGET;
 use crate::estimator::gate::GateOutcome;
 use crate::fit::doubts::DIVERGES;
 use crate::fit::{Fit, NOT_CONVERGED, Warning};
@@ -8,10 +9,6 @@ use crate::math::{deviation, three_digits};
 use crate::record::{Record, Signal};
 use crate::setting::number;
 use crate::twin::{PRIOR_DEVIATION, Role, Twin};
-
-/// Share of a prior's information in an answer from which on the answer leans on it: the prior then moves the answer by this share of
-/// the truth's distance from its centre.
-const LEANING: f64 = 0.1;
 
 /// Lists what makes an estimate doubtful; `fit` is the likelihood's own, where there is one.
 pub(super) fn warnings(
@@ -61,7 +58,7 @@ pub(super) fn warnings(
             .filter(|(p, error)| {
                 let prior = PRIOR_DEVIATION * p.prior.width();
                 p.role == Role::Parameter
-                    && error.powi(2) > LEANING * (error.powi(2) + prior.powi(2))
+                    && error.powi(2) > BUDGET.leaning * (error.powi(2) + prior.powi(2))
             })
             .map(|(p, _)| p.name.as_str())
             .collect();

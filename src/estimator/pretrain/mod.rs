@@ -1,6 +1,7 @@
 //! Pretraining: a bank of simulations, and a network trained on it; it can be interrupted.
 
 use crate::estimator::bank::{Bank, Draws, Prior};
+use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::project::{PresetName, Project};
@@ -17,14 +18,8 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Simulations apart from the bank, on which the error of the network is measured.
-const CALIBRATION: usize = 1000;
-/// Rows that inputs and targets are standardised with.
-const STANDARD: usize = 20_000;
 /// Most simulations of a bank in memory.
 const MOST_IN_MEMORY: usize = 10_000_000;
-/// Largest network input, in standard deviations of the bank: far outside, the network should not extrapolate.
-const LIMIT: f64 = 6.0;
 /// Layout of the folder; raised when it changes.
 const LAYOUT: u32 = 1;
 const VERB: &str = "pretrain";
@@ -89,14 +84,7 @@ impl<'a> PretrainPlan<'a> {
         settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
         settings.check()?;
         let prior = Prior::new(project.study(), recipe.features.as_ref())?;
-        let most = recipe.architecture.max_features();
-        if prior.dim() > most {
-            return Err(EstimatorError::Inputs(format!(
-                "the features are {} numbers, network \"{}\" takes at most {most}; lower their order or choose a wider network",
-                prior.dim(),
-                recipe.architecture.id()
-            )));
-        }
+        (recipe.check_width(prior.dim())).map_err(EstimatorError::Inputs)?;
         Ok(Self {
             project,
             options,
@@ -151,13 +139,12 @@ impl<'a> PretrainPlan<'a> {
         }
         let inputs = match settings.inputs {
             Inputs::Each => Standardiser::each(&first.features),
-            Inputs::Principal => {
-                Standardiser::principal(&first.features, LIMIT).map_err(|error| {
+            Inputs::Principal => Standardiser::principal(&first.features, BUDGET.largest_input)
+                .map_err(|error| {
                     let problem =
                         format!("the features of the bank cannot be standardised: {error}");
                     EstimatorError::Inputs(problem)
-                })?
-            }
+                })?,
         };
         let targets = Scaler::fit(&first.theta);
         let samples = Samples {
@@ -177,10 +164,10 @@ impl<'a> PretrainPlan<'a> {
         let (network, history) =
             (recipe.architecture).train_on(&samples, training, seed, checkpoints, progress)?;
         drop(samples);
-        let stage = progress.stage("calibration", CALIBRATION);
+        let stage = progress.stage("calibration", BUDGET.calibration);
         let Draws {
             theta, features, ..
-        } = prior.rows(0..CALIBRATION as u64, seed, "calibration", &stage)?;
+        } = prior.rows(0..BUDGET.calibration as u64, seed, "calibration", &stage)?;
         let mut estimator = Estimator {
             project: project.clone(),
             preset,
@@ -204,10 +191,10 @@ impl<'a> PretrainPlan<'a> {
     }
 }
 
-/// The first [`STANDARD`] rows of a bank, or all: rows are alike, and so many tell means and deviations well enough.
+/// The first rows of a bank, or all: rows are alike, and so many tell means and deviations well enough.
 fn first_rows(bank: &dyn Bank) -> Result<Draws, EstimatorError> {
     let sizes = bank.parts();
-    let rows = sizes.iter().sum::<usize>().min(STANDARD);
+    let rows = sizes.iter().sum::<usize>().min(BUDGET.standard_rows);
     let parts = (0..sizes.len()).map(|index| bank.part(index));
     Draws::stacked(rows, parts, |index| {
         EstimatorError::Bank(format!(

@@ -15,6 +15,7 @@ mod information;
 
 pub(crate) use information::FeatureInformation;
 
+use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::gate::{GateTest, whiten};
 use crate::estimator::settings::RefineSettings;
@@ -24,9 +25,6 @@ use crate::progress::Stage;
 use crate::twin::{Interval, Noise};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-
-/// Largest move, in prior widths, of an estimate that rests.
-const AT_REST: f64 = 1e-3;
 
 /// The refined estimate, with what was simulated around it.
 #[derive(Debug, Clone)]
@@ -195,7 +193,7 @@ impl Refinement<'_> {
                 _ => self.whiten(theta)?,
             };
             stage.tick()?;
-            if moved.amax() < AT_REST {
+            if moved.amax() < BUDGET.at_rest {
                 break;
             }
         }
