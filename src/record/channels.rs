@@ -48,12 +48,18 @@ impl Default for Signals {
 }
 
 /// Column names of a record file: `u` for one channel, `u1,u2,…` for several, nothing for none.
-pub(super) fn column_names(letter: &str, channels: usize) -> Vec<String> {
+pub(crate) fn column_names(letter: &str, channels: usize) -> Vec<String> {
     match channels {
         0 => vec![],
         1 => vec![letter.into()],
         _ => (1..=channels).map(|j| format!("{letter}{j}")).collect(),
     }
+}
+
+/// Columns of a record file with so many channels.
+pub(super) fn columns(inputs: usize, outputs: usize) -> Vec<String> {
+    let time = vec!["t".to_owned()];
+    [time, column_names("u", inputs), column_names("y", outputs)].concat()
 }
 
 /// Columns of files that do not have the usual names: name in the twin → column in the file.
@@ -72,12 +78,9 @@ impl Columns {
     /// The same without those of outputs, for files of time and inputs.
     pub(super) fn without_outputs(&self, signals: Option<&Signals>) -> Self {
         let is_output = |key: &str| usual_name(key, signals).is_some_and(|n| n.starts_with('y'));
-        let others = self.0.iter().filter(|(key, _)| !is_output(key));
-        Self(
-            others
-                .map(|(key, name)| (key.clone(), name.clone()))
-                .collect(),
-        )
+        let mut columns = self.0.clone();
+        columns.retain(|key, _| !is_output(key));
+        Self(columns)
     }
 
     /// Translates a header into the usual names, `None` for a column that is left out.
@@ -191,7 +194,7 @@ impl FromStr for Columns {
 }
 
 /// Returns `true` for t, u, u1, y, y1 and so on.
-fn is_usual(name: &str) -> bool {
+pub(super) fn is_usual(name: &str) -> bool {
     let channel = name.strip_prefix(['u', 'y']);
     name == "t" || channel.is_some_and(|rest| rest.bytes().all(|b| b.is_ascii_digit()))
 }

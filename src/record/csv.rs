@@ -4,13 +4,12 @@
 //! names by [`Columns`]. Columns are separated by commas, semicolons or tabs. An output that was not measured is an empty cell, `nan` or
 //! `NA`. Steps that are the same to 1e-3 count as one. Rows are counted as an editor counts lines: the header is row 1.
 
-use super::channels::{Columns, column_names};
+use super::channels::{Columns, columns};
 use super::parquet;
 use super::table::Table;
 use super::text::Text;
 use crate::record::{Drive, Record, RecordError, Signal, Signals};
 use crate::storage::files::write_new;
-use crate::storage::untrusted::MOST_NUMBERS;
 use std::path::Path;
 
 impl Record {
@@ -48,30 +47,19 @@ impl Drive {
 
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
 pub fn parse_record(text: &str, path: &Path) -> Result<Record, RecordError> {
-    let mut left = MOST_NUMBERS;
     let text = Text::own(text.as_bytes());
-    Table::parse(text, path, &Columns::default(), None, &mut left)?.record(path)
+    Table::parse(text, path, &Columns::default(), None, &mut 0)?.record(path)
 }
 
 /// Reads the files of one call: their columns have the same names, and all of them together have a limit.
+#[derive(Default)]
 pub struct RecordReader {
     columns: Columns,
     signals: Option<Signals>,
     /// Name of the twin whose channels each record must have.
     twin: Option<String>,
-    /// Numbers that may be read yet.
-    left: usize,
-}
-
-impl Default for RecordReader {
-    fn default() -> Self {
-        Self {
-            columns: Columns::default(),
-            signals: None,
-            twin: None,
-            left: MOST_NUMBERS,
-        }
-    }
+    /// Numbers read so far.
+    read: usize,
 }
 
 impl RecordReader {
@@ -109,17 +97,17 @@ impl RecordReader {
 
     fn read(&mut self, path: &Path, columns: &Columns) -> Result<Table, RecordError> {
         let signals = self.signals.as_ref();
-        let left = &mut self.left;
+        let read = &mut self.read;
         if path.extension().is_some_and(|e| e == "parquet") {
             return parquet::with_rows(path, |rows| {
-                Table::parse(Text::own(rows), path, columns, signals, left)
+                Table::parse(Text::own(rows), path, columns, signals, read)
             });
         }
         let wrong = |error| RecordError::io(path, error);
         let file = std::fs::File::open(path).map_err(wrong)?;
         let text = Text::open(file).map_err(wrong)?;
         let text = text.map_err(|problem| RecordError::file(path, problem))?;
-        Table::parse(text, path, columns, signals, left)
+        Table::parse(text, path, columns, signals, read)
     }
 }
 
@@ -134,21 +122,18 @@ pub(crate) fn record_csv_text(record: &Record) -> String {
 }
 
 fn csv_text(drive: &Drive, outputs: &Signal) -> String {
-    let mut header = vec!["t".to_owned()];
-    header.extend(column_names("u", drive.inputs().ncols()));
-    header.extend(column_names("y", outputs.ncols()));
-    let mut text = header.join(",");
-    text.push('\n');
+    let header = columns(drive.inputs().ncols(), outputs.ncols());
+    let mut text = header.join(",") + "\n";
     for k in 0..drive.samples() {
         let t = match drive.is_uniform() {
             true => rounded_time(drive.time(k), drive.dt()),
             false => drive.time(k),
         };
-        text.push_str(&t.to_string());
+        text += &t.to_string();
         for value in drive.input(k).iter().chain(outputs.row(k)) {
             text.push(',');
             if !value.is_nan() {
-                text.push_str(&value.to_string());
+                text += &value.to_string();
             }
         }
         text.push('\n');
@@ -178,6 +163,7 @@ fn rounded_time(t: f64, dt: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::storage::untrusted::MOST_NUMBERS;
 
     fn written(text: &str) -> Result<Record, RecordError> {
         let folder = tempfile::tempdir().unwrap();
@@ -196,7 +182,7 @@ mod tests {
         let path = folder.path().join("r.csv");
         std::fs::write(&path, "t,u,y\n0,1,2\n1,1,2\n").unwrap();
         let mut reader = RecordReader {
-            left: 17,
+            read: MOST_NUMBERS - 17,
             ..RecordReader::default()
         };
         for _ in 0..2 {

@@ -35,21 +35,11 @@ impl Drive {
         if inputs.nrows() == 0 {
             return Err(RecordError::Empty);
         }
-        if let Some(((sample, channel), &value)) =
-            inputs.indexed_iter().find(|(_, v)| !v.is_finite())
-        {
-            return Err(RecordError::NotFinite {
-                kind: "input",
-                channel: channel + 1,
-                sample,
-                value,
-            });
-        }
+        check_values(&inputs, "input", |v| !v.is_finite())?;
         // Rows are read as slices in the simulation loop.
-        let inputs = if inputs.is_standard_layout() {
-            inputs
-        } else {
-            inputs.as_standard_layout().into_owned()
+        let inputs = match inputs.is_standard_layout() {
+            true => inputs,
+            false => inputs.as_standard_layout().into_owned(),
         };
         Ok(Self {
             dt,
@@ -74,12 +64,7 @@ impl Drive {
     /// # Ok::<(), truetwin::record::RecordError>(())
     /// ```
     pub fn with_times(times: &[f64], inputs: Signal) -> Result<Self, RecordError> {
-        if times.len() != inputs.nrows() {
-            return Err(RecordError::Times {
-                times: times.len(),
-                inputs: inputs.nrows(),
-            });
-        }
+        check_rows(times.len(), &inputs)?;
         if times.len() < 2 {
             return Err(RecordError::Empty);
         }
@@ -130,24 +115,19 @@ impl Drive {
 
     /// The same time grid with other inputs, as many rows.
     pub(crate) fn with_inputs(&self, inputs: Signal) -> Result<Self, RecordError> {
-        let new = Self::new(self.dt, inputs)?;
-        let (given, rows) = (new.samples(), self.samples());
-        match &self.times {
-            Some(_) if given != rows => Err(RecordError::Times {
-                times: rows,
-                inputs: given,
-            }),
-            times => Ok(Self {
-                times: times.clone(),
-                ..new
-            }),
+        if let Some(times) = &self.times {
+            check_rows(times.len(), &inputs)?;
         }
+        Ok(Self {
+            times: self.times.clone(),
+            ..Self::new(self.dt, inputs)?
+        })
     }
 
     /// The same inputs later by so many seconds, linear between samples; the first ones before the start.
     pub(crate) fn late(&self, delay: f64) -> Result<Self, RecordError> {
         let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
-        let value = |k: usize, j: usize| {
+        let value = |(k, j): (usize, usize)| {
             let t = times[k] - delay;
             let after = times.partition_point(|time| *time <= t).min(k.max(1));
             let Some(i) = after.checked_sub(1) else {
@@ -159,9 +139,7 @@ impl Drive {
             let share = ((t - times[i]) / (times[after] - times[i])).clamp(0.0, 1.0);
             (1.0 - share) * self.inputs[[i, j]] + share * self.inputs[[after, j]]
         };
-        self.with_inputs(Signal::from_shape_fn(self.inputs.dim(), |(k, j)| {
-            value(k, j)
-        }))
+        self.with_inputs(Signal::from_shape_fn(self.inputs.dim(), value))
     }
 
     /// A drive without inputs, N = `samples`.
@@ -218,15 +196,40 @@ impl Drive {
     }
 }
 
+fn check_rows(times: usize, inputs: &Signal) -> Result<(), RecordError> {
+    match inputs.nrows() {
+        rows if rows == times => Ok(()),
+        rows => Err(RecordError::Lengths(format!(
+            "{times} times and {rows} rows of inputs"
+        ))),
+    }
+}
+
+/// Refuses a signal of which one value is `wrong`.
+pub(super) fn check_values(
+    signal: &Signal,
+    kind: &'static str,
+    wrong: impl Fn(f64) -> bool,
+) -> Result<(), RecordError> {
+    match signal.indexed_iter().find(|(_, value)| wrong(**value)) {
+        None => Ok(()),
+        Some(((sample, channel), &value)) => Err(RecordError::NotFinite {
+            kind,
+            channel: channel + 1,
+            sample,
+            value,
+        }),
+    }
+}
+
 /// A signal of one slice a channel.
 pub(super) fn signal(channels: &[impl AsRef<[f64]>]) -> Result<Signal, RecordError> {
     let rows = channels.first().map_or(0, |first| first.as_ref().len());
     let other = |channel: &&_| AsRef::<[f64]>::as_ref(*channel).len() != rows;
     if let Some(other) = channels.iter().find(other) {
-        return Err(RecordError::SliceLengths {
-            rows,
-            other: other.as_ref().len(),
-        });
+        let other = other.as_ref().len();
+        let problem = format!("channels of {rows} and of {other} samples");
+        return Err(RecordError::Lengths(problem));
     }
     Ok(Signal::from_shape_fn((rows, channels.len()), |(k, j)| {
         channels[j].as_ref()[k]

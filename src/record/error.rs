@@ -15,33 +15,12 @@ pub enum RecordError {
     /// No sample at all.
     #[error("no samples; at least one is needed")]
     Empty,
-    /// Inputs and outputs of different lengths.
-    #[error("{inputs} rows of inputs and {outputs} rows of outputs; both need the same number")]
-    Lengths {
-        /// Rows of inputs.
-        inputs: usize,
-        /// Rows of outputs.
-        outputs: usize,
-    },
-    /// Channels of one signal with different lengths.
-    #[error("channels of {rows} and of {other} samples; all of a signal need the same number")]
-    SliceLengths {
-        /// Samples of the first channel.
-        rows: usize,
-        /// Samples of another one.
-        other: usize,
-    },
-    /// Times and inputs of different lengths.
-    #[error("{times} times and {inputs} rows of inputs; both need the same number")]
-    Times {
-        /// Times.
-        times: usize,
-        /// Rows of inputs.
-        inputs: usize,
-    },
+    /// Times, inputs, outputs or their channels of different lengths.
+    #[error("{0}; both need the same number")]
+    Lengths(String),
     /// A time that does not follow the one before it.
     #[error(
-        "sample {sample}: {} s follows {} s; time must increase: sort the rows, remove repeated ones",
+        "{} s follows {} s; time must increase: sort the rows, remove repeated ones",
         number(*time),
         number(*before)
     )]

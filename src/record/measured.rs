@@ -1,7 +1,7 @@
 //! A measured experiment.
 
-use super::channels::column_names;
-use super::drive::signal;
+use super::channels::{column_names, columns};
+use super::drive::{check_values, signal};
 use crate::math::six_digits;
 use crate::record::{Drive, RecordError, Signal, Signals, step_of};
 use ndarray::{ArrayView2, s};
@@ -31,15 +31,16 @@ impl Record {
     /// two rows need one.
     pub fn new(drive: Drive, outputs: Signal) -> Result<Self, RecordError> {
         if outputs.nrows() != drive.samples() {
-            return Err(RecordError::Lengths {
-                inputs: drive.samples(),
-                outputs: outputs.nrows(),
-            });
+            return Err(RecordError::Lengths(format!(
+                "{} rows of inputs and {} rows of outputs",
+                drive.samples(),
+                outputs.nrows()
+            )));
         }
         if outputs.ncols() == 0 {
             return Err(RecordError::NoOutput);
         }
-        check_outputs(&outputs, f64::is_infinite)?;
+        check_values(&outputs, "output", f64::is_infinite)?;
         if outputs.iter().any(|v| v.is_nan()) {
             let measured = |v: &f64| !v.is_nan();
             let mut columns = outputs.columns().into_iter();
@@ -90,7 +91,7 @@ impl Record {
 
     /// As [`new`](Self::new), of simulated outputs, none of which may be missing.
     pub(crate) fn complete(drive: Drive, outputs: Signal) -> Result<Self, RecordError> {
-        check_outputs(&outputs, |v| !v.is_finite())?;
+        check_values(&outputs, "output", |v| !v.is_finite())?;
         Self::new(drive, outputs)
     }
 
@@ -184,46 +185,25 @@ impl Record {
 
     /// Checks that a twin with these channels can be compared with the record.
     pub fn check_channels(&self, signals: &Signals) -> Result<(), RecordError> {
-        for (kind, letter, given, expected) in [
-            (
-                "inputs",
-                "u",
-                self.drive.inputs().ncols(),
-                signals.inputs.len(),
-            ),
-            ("outputs", "y", self.outputs.ncols(), signals.outputs.len()),
-        ] {
-            if given != expected {
-                let inputs = column_names("u", signals.inputs.len());
-                let outputs = column_names("y", signals.outputs.len());
-                let columns = [vec!["t".to_owned()], inputs, outputs].concat();
-                return Err(RecordError::Channels {
-                    kind,
-                    given,
-                    expected,
-                    names: match expected {
-                        0 => String::new(),
-                        _ => format!(" ({})", column_names(letter, expected).join(",")),
-                    },
-                    twin: format!("the twin takes the columns {}", columns.join(",")),
-                });
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Refuses outputs of which one is `wrong`.
-fn check_outputs(outputs: &Signal, wrong: impl Fn(f64) -> bool) -> Result<(), RecordError> {
-    let first = outputs.indexed_iter().find(|(_, v)| wrong(**v));
-    first.map_or(Ok(()), |((sample, channel), &value)| {
-        Err(RecordError::NotFinite {
-            kind: "output",
-            channel: channel + 1,
-            sample,
-            value,
+        let (inputs, outputs) = (signals.inputs.len(), signals.outputs.len());
+        let own = (self.drive.inputs().ncols(), self.outputs.ncols());
+        let (kind, letter, given, expected) = match own {
+            (given, _) if given != inputs => ("inputs", "u", given, inputs),
+            (_, given) if given != outputs => ("outputs", "y", given, outputs),
+            _ => return Ok(()),
+        };
+        let columns = columns(inputs, outputs).join(",");
+        Err(RecordError::Channels {
+            kind,
+            given,
+            expected,
+            names: match expected {
+                0 => String::new(),
+                _ => format!(" ({})", column_names(letter, expected).join(",")),
+            },
+            twin: format!("the twin takes the columns {columns}"),
         })
-    })
+    }
 }
 
 /// Missing outputs are equal.

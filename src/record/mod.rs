@@ -18,7 +18,7 @@ mod stamp;
 mod table;
 mod text;
 
-pub(crate) use channels::Columns;
+pub(crate) use channels::{Columns, column_names};
 pub use channels::{Quantity, Signals};
 pub(crate) use csv::{RecordReader, drive_csv_text, parse_record, record_csv_text};
 pub use drive::{Drive, Signal};
@@ -26,3 +26,4 @@ pub use error::RecordError;
 pub use measured::Record;
 pub(crate) use resample::{InputRule, Resampled, resample};
 pub(crate) use rounding::{distinct, step_of};
+pub(crate) use table::MOST_SAMPLES;

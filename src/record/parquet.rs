@@ -31,13 +31,8 @@ pub(super) fn with_rows<T>(
     };
     let reader = SerializedFileReader::new(file).map_err(wrong)?;
     let schema = reader.metadata().file_metadata().schema_descr();
-    let names: Vec<&str> = schema
-        .columns()
-        .iter()
-        .map(|column| column.name())
-        .collect();
-    let names: Vec<String> = (names.iter())
-        .map(|name| format!("\"{}\"", name.replace('"', "\"\"")))
+    let names: Vec<String> = (schema.columns().iter())
+        .map(|column| format!("\"{}\"", column.name().replace('"', "\"\"")))
         .collect();
     let header = names.join(",") + "\n";
     let rows = reader.get_row_iter(None).map_err(wrong)?;

@@ -119,23 +119,18 @@ fn resampled_inputs(drive: &Drive, step: f64, samples: usize, rule: InputRule) -
             acting += 1;
         }
         if rule == InputRule::Hold {
-            row.iter_mut()
-                .zip(drive.input(acting))
-                .for_each(|(to, u)| *to = *u);
+            row.assign(&drive.inputs().row(acting));
             continue;
         }
         // The last input is held beyond the record.
         let (mut i, mut from) = (acting, start);
         while from < end {
-            let until = if i < last {
-                drive.time(i + 1).min(end)
-            } else {
-                end
+            let until = match i < last {
+                true => drive.time(i + 1).min(end),
+                false => end,
             };
             let share = (until - from).max(0.0) / step;
-            row.iter_mut()
-                .zip(drive.input(i))
-                .for_each(|(to, u)| *to += share * u);
+            row.scaled_add(share, &drive.inputs().row(i));
             (from, i) = (until.max(from), i + 1);
             if i > last {
                 break;

@@ -1,6 +1,6 @@
 //! The numbers of a record file, checked cell by cell.
 
-use super::channels::{Columns, Signals, column_names};
+use super::channels::{Columns, Signals, column_names, columns, is_usual};
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};
 use crate::record::{Drive, Record, RecordError, Signal};
@@ -9,7 +9,7 @@ use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt, quoted};
 use std::path::Path;
 
 /// Longest record: a sample a millisecond for half a day.
-pub(super) const MOST_SAMPLES: usize = 50_000_000;
+pub(crate) const MOST_SAMPLES: usize = 50_000_000;
 /// Most columns: t and a thousand inputs and outputs each.
 const MOST_COLUMNS: usize = 2001;
 /// Largest measured value: squares and sums of squares of a record must stay finite.
@@ -17,6 +17,8 @@ const LARGEST: f64 = 1e100;
 
 /// The numbers of a file.
 pub(super) struct Table {
+    /// Name of the column of times.
+    time: String,
     times: Vec<f64>,
     inputs: Signal,
     outputs: Signal,
@@ -31,7 +33,8 @@ impl Table {
                 format!("{names}: an input file has t and inputs alone; remove the output columns");
             return Err(RecordError::file(path, problem));
         }
-        Drive::with_times(&self.times, self.inputs).map_err(|error| error.within(path))
+        let drive = Drive::with_times(&self.times, self.inputs);
+        drive.map_err(|error| in_file(error, path, &self.time))
     }
 
     /// The table as a record, which needs outputs.
@@ -42,16 +45,16 @@ impl Table {
         }
         (Drive::with_times(&self.times, self.inputs))
             .and_then(|drive| Record::new(drive, self.outputs))
-            .map_err(|error| error.within(path))
+            .map_err(|error| in_file(error, path, &self.time))
     }
 
-    /// Parses a table; `left` is how many numbers may be read yet, in this file and those that follow.
+    /// Parses a table; `read` counts the numbers of this file and those before.
     pub fn parse(
         text: Text<'_>,
         path: &Path,
         columns: &Columns,
         signals: Option<&Signals>,
-        left: &mut usize,
+        read: &mut usize,
     ) -> Result<Self, RecordError> {
         let separator = text.separator;
         let mut reader = Rows::separated(text.text, separator);
@@ -97,12 +100,12 @@ impl Table {
             if t.len() == MOST_SAMPLES {
                 return Err(large(format!("more than {MOST_SAMPLES} samples")));
             }
-            if width > *left {
+            *read += width;
+            if *read > MOST_NUMBERS {
                 return Err(large(format!(
                     "more than {MOST_NUMBERS} numbers in all records together"
                 )));
             }
-            *left -= width;
             let number = cells.position().map_or(t.len() + 2, |p| p.line() as usize);
             for ((cell, place), name) in cells.iter().zip(&places).zip(&header) {
                 if let Some(place) = *place {
@@ -119,16 +122,34 @@ impl Table {
             let problem = format!("{rows} rows of data; at least 2 are needed to know the step");
             return Err(RecordError::file(path, problem));
         }
-        check_order(path, time, &t)?;
         let signal = |width: usize, values: Vec<f64>| {
             Signal::from_shape_vec((rows, width), values)
                 .map_err(|error| RecordError::file(path, error))
         };
         Ok(Self {
+            time: time.into(),
             times: t,
             inputs: signal(inputs, u)?,
             outputs: signal(outputs, y)?,
         })
+    }
+}
+
+/// Adds file, row and column to an error of the numbers of a table.
+fn in_file(error: RecordError, path: &Path, time: &str) -> RecordError {
+    match error {
+        RecordError::TimeOrder { sample, .. } => {
+            RecordError::cell(path, sample + 2, time, error.to_string())
+        }
+        RecordError::Step(step) => RecordError::file(
+            path,
+            format!(
+                "column {}: a step of {} s is too small to compute with; write t in seconds",
+                quoted(time),
+                number(step)
+            ),
+        ),
+        error => error.within(path),
     }
 }
 
@@ -189,14 +210,29 @@ impl CellParser {
         }
     }
 
-    /// Parses a number, with a decimal comma if commas do not separate the columns.
+    /// Parses a number that can be computed with; with a decimal comma if commas do not separate the columns.
     fn number(&mut self, cell: &str, row: usize) -> Result<f64, String> {
-        if self.separator != b','
-            && let Some(value) = self.decimals.parse(cell, row)?
-        {
-            return check_size(value, cell);
+        let value = match self.separator {
+            b',' => None,
+            _ => self.decimals.parse(cell, row)?,
+        };
+        match value.or_else(|| cell.parse().ok()) {
+            Some(value) if value.abs() <= LARGEST => Ok(value),
+            Some(value) if value.is_finite() => Err(format!(
+                "{} is beyond ±{LARGEST:e}, the largest value of a record; correct or remove the row",
+                excerpt(cell)
+            )),
+            None if cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
+                Err(format!(
+                    "\"{}\" has a decimal comma; write decimal points, or separate the columns by semicolons",
+                    quoted(cell)
+                ))
+            }
+            _ => Err(format!(
+                "\"{}\" is no finite number; correct it, or leave the cell of an output empty if it was not measured",
+                quoted(cell)
+            )),
         }
-        parse_number(cell)
     }
 }
 
@@ -205,41 +241,6 @@ fn not_a_stamp(cell: &str) -> String {
         "\"{}\" is no time stamp of ISO 8601; write 2024-03-31T14:00:00.5, with Z or +02:00 if it has a zone, or seconds",
         quoted(cell)
     )
-}
-
-/// Refuses values that cannot be computed with.
-fn check_size(value: f64, cell: &str) -> Result<f64, String> {
-    if value.is_finite() && value.abs() > LARGEST {
-        return Err(format!(
-            "{} is beyond ±{LARGEST:e}, the largest value of a record; correct or remove the row",
-            excerpt(cell)
-        ));
-    }
-    match value.is_finite() {
-        true => Ok(value),
-        false => Err(not_finite(cell)),
-    }
-}
-
-fn not_finite(cell: &str) -> String {
-    format!(
-        "\"{}\" is no finite number; correct it, or leave the cell of an output empty if it was not measured",
-        quoted(cell)
-    )
-}
-
-/// Parses a number with a decimal point.
-fn parse_number(cell: &str) -> Result<f64, String> {
-    match cell.parse::<f64>() {
-        Ok(value) => check_size(value, cell),
-        _ if cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
-            Err(format!(
-                "\"{}\" has a decimal comma; write decimal points, or separate the columns by semicolons",
-                quoted(cell)
-            ))
-        }
-        _ => Err(not_finite(cell)),
-    }
 }
 
 /// The parser's error, by row.
@@ -288,41 +289,30 @@ fn check_header(names: &[&str]) -> Result<(), &'static str> {
 fn channels(names: &[&str]) -> Result<(usize, usize), String> {
     let count = |letter: char| names.iter().filter(|n| n.starts_with(letter)).count();
     let (inputs, outputs) = (count('u'), count('y'));
-    let mut expected = vec!["t".to_owned()];
-    expected.extend(column_names("u", inputs));
-    expected.extend(column_names("y", outputs));
-    let rename = || format!("rename the columns to {}", excerpt(&expected.join(",")));
-    if let Some((_, name)) = (names.iter().enumerate()).find(|(j, name)| names[..*j].contains(name))
-    {
-        return Err(match *name {
-            "t" => "column t appears twice; remove one".into(),
-            name => format!("column \"{}\" appears twice; {}", quoted(name), rename()),
-        });
+    let expected = columns(inputs, outputs);
+    let rename = format!("rename the columns to {}", excerpt(&expected.join(",")));
+    for (j, name) in names.iter().enumerate() {
+        let is_repeated = names[..j].contains(name);
+        let is_expected = match *name {
+            "u1" if inputs == 1 => true,
+            "y1" if outputs == 1 => true,
+            name => expected.iter().any(|e| e == name),
+        };
+        let problem = match *name {
+            "t" if is_repeated => "appears twice; remove one",
+            _ if is_repeated => &format!("appears twice; {rename}"),
+            name if !is_usual(name) => {
+                "is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,…, and remove others"
+            }
+            _ if !is_expected => &format!("is out of order; {rename}"),
+            _ => continue,
+        };
+        return Err(format!("column \"{}\" {problem}", quoted(name)));
     }
-    let channel =
-        |name: &str| name.starts_with(['u', 'y']) && name[1..].chars().all(|c| c.is_ascii_digit());
-    if let Some(name) = names.iter().find(|name| **name != "t" && !channel(name)) {
-        return Err(format!(
-            "column \"{}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,…, and remove others",
-            quoted(name)
-        ));
+    match names.contains(&"t") {
+        true => Ok((inputs, outputs)),
+        false => Err("column t is missing; add the time of each row in seconds".into()),
     }
-    let known = |name: &str| {
-        expected.iter().any(|e| e == name)
-            || (name == "u1" && inputs == 1)
-            || (name == "y1" && outputs == 1)
-    };
-    if let Some(name) = names.iter().find(|name| !known(name)) {
-        return Err(format!(
-            "column \"{}\" is out of order; {}",
-            excerpt(name),
-            rename()
-        ));
-    }
-    if !names.contains(&"t") {
-        return Err("column t is missing; add the time of each row in seconds".into());
-    }
-    Ok((inputs, outputs))
 }
 
 /// Index of a column in a row: t first, then inputs, then outputs.
@@ -333,28 +323,4 @@ fn place(name: &str, inputs: usize) -> usize {
         b'y' => inputs + number,
         _ => 0,
     }
-}
-
-/// Checks that time increases from row to row, by steps that can be computed with.
-fn check_order(path: &Path, time: &str, t: &[f64]) -> Result<(), RecordError> {
-    for (k, pair) in t.windows(2).enumerate() {
-        let step = pair[1] - pair[0];
-        if step <= 0.0 {
-            let problem = format!(
-                "{} s follows {} s; time must increase: sort the rows, remove repeated ones",
-                number(pair[1]),
-                number(pair[0])
-            );
-            return Err(RecordError::cell(path, k + 3, time, problem));
-        }
-        if !step.is_normal() {
-            let problem = format!(
-                "column {}: a step of {} s is too small to compute with; write t in seconds",
-                quoted(time),
-                number(step)
-            );
-            return Err(RecordError::file(path, problem));
-        }
-    }
-    Ok(())
 }
