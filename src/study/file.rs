@@ -1,21 +1,20 @@
 //! The study file: a twin in the user's own setting.
 
-use crate::effect::{EffectEntry, EffectPattern};
+use crate::effect::EffectEntry;
 use crate::feature::FeatureRecipe;
-use crate::record::{Columns, Drive};
+use crate::record::Drive;
 use crate::setting::number;
 use crate::storage::files::folder;
 use crate::storage::untrusted::{check_names, message, read_text};
 use crate::study::error::StudyError;
 use crate::study::plan::InputPlan;
-use crate::study::prior::{PriorTable, flatten};
-use crate::study::shapes::check_shapes;
-use crate::twin::{Hold, Integrator, Interval, NoiseLevel, StartLevel, TwinError};
+use crate::study::tables::{Library, PriorTable, RecordTable, check_shapes, dotted};
+use crate::twin::{Interval, NoiseLevel, StartLevel, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use toml::Spanned;
+use toml::de::DeTable;
 
 /// Longest study file, in bytes: a hundred times one that names every parameter and effect.
 const MOST: u64 = 1 << 20;
@@ -89,7 +88,6 @@ pub struct StudyFile {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) start: BTreeMap<String, StartLevel>,
     /// Features, in place of the preset's.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) features: Option<Arc<dyn FeatureRecipe>>,
     /// Effects added to the twin.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -100,62 +98,6 @@ pub struct StudyFile {
     /// Path and text that it was parsed from, for the lines in messages; none if it was made in the program.
     #[serde(skip)]
     pub(crate) origin: Option<(PathBuf, Arc<str>)>,
-}
-
-/// `[record]`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RecordTable {
-    /// Step in seconds.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub step: Option<f64>,
-    /// Number of samples.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub samples: Option<usize>,
-    /// Inputs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub input: Option<InputPlan>,
-    /// Inputs between samples, also of measured records.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hold: Option<Hold>,
-    /// Integrator of the twin, also for measured records.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub integrator: Option<Integrator>,
-    /// Steps of the integrator within a sample, also of measured records.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub substeps: Option<usize>,
-    /// Columns of measured records that do not have the usual names.
-    #[serde(skip_serializing_if = "Columns::is_empty")]
-    pub columns: Columns,
-}
-
-impl RecordTable {
-    fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// Returns `true` if it says what simulated records look like.
-    pub(crate) fn is_plan(&self) -> bool {
-        self.step.is_some() || self.samples.is_some() || self.input.is_some()
-    }
-}
-
-/// `[library]`: effects that a diagnosis may name.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Library {
-    /// These alone (all if empty): ids, or `id@target`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub only: Vec<EffectPattern>,
-    /// Not these.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub without: Vec<EffectPattern>,
-}
-
-impl Library {
-    fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 impl StudyFile {
@@ -201,9 +143,11 @@ impl StudyFile {
             let start = error.span().map_or(0, |span| span.start);
             wrong(line(text, start), error.message())
         };
-        let table: toml::Table = toml::from_str(text).map_err(syntax)?;
-        check_shapes(&table).map_err(|(key, problem)| wrong(line_of(text, &key), &problem))?;
+        let table = DeTable::parse(text).map_err(syntax)?;
+        check_shapes(table.get_ref())
+            .map_err(|(start, problem)| wrong(line(text, start), &problem))?;
         let mut file: Self = toml::from_str(text).map_err(syntax)?;
+        let table: toml::Table = toml::from_str(text).map_err(syntax)?;
         check_names(&table).map_err(|problem| wrong(1, &problem))?;
         if !table.contains_key("twin") {
             return Err(StudyError::NoTwin(path.into()));
@@ -214,100 +158,52 @@ impl StudyFile {
 
     /// Adds to the error of effect `index` its line, if the file was parsed from a text.
     pub(super) fn effect_error(&self, index: usize, error: TwinError) -> StudyError {
-        match (&self.origin, self.effect.get(index)) {
-            (Some(origin), Some(entry)) => with_line(error, origin, index, entry),
-            _ => error.into(),
+        let place = self.origin.as_ref().and_then(|(path, text)| {
+            let line = line_of_effect(text, index, self.effect.get(index)?, &error)?;
+            Some((path.clone(), line))
+        });
+        match place {
+            Some((path, line)) => StudyError::EffectAt { path, line, error },
+            None => error.into(),
         }
     }
 }
 
-/// A table whose keys may be dotted: `start.h1 = …` is the key `start.h1`.
-fn dotted<'de, D, V>(deserializer: D) -> Result<BTreeMap<String, V>, D::Error>
-where
-    D: serde::Deserializer<'de>,
-    V: serde::de::DeserializeOwned,
-{
-    let table = toml::Table::deserialize(deserializer)?;
-    let mut flat = BTreeMap::new();
-    flatten("", table, &mut flat).map_err(serde::de::Error::custom)?;
-    Ok(flat)
-}
-
-/// The first line that sets a key or begins its table, from 1.
-fn line_of(text: &str, key: &str) -> usize {
-    let begins = |line: &str| {
-        let line = line
-            .trim_start()
-            .trim_start_matches('[')
-            .trim_start_matches('"');
-        let path = line.split(['=', ']', '"']).next().unwrap_or_default();
-        path.trim().rsplit('.').next() == Some(key)
-    };
-    text.lines().position(begins).map_or(1, |at| at + 1)
-}
-
-/// The tables of a study file that effects stand in, each value with its place in the text.
-#[derive(Deserialize)]
-struct Tables {
-    #[serde(default)]
-    effect: Vec<Keys>,
-}
-
-#[derive(Deserialize)]
-struct Keys {
-    id: Spanned<String>,
-    target: Spanned<String>,
-    from: Option<Spanned<String>>,
-    to: Option<Spanned<String>>,
-    #[serde(default)]
-    magnitudes: BTreeMap<String, Spanned<f64>>,
-}
-
-impl Keys {
-    /// Returns whether the table is that of `entry`: a caller may have changed the effects since.
-    fn is(&self, entry: &EffectEntry) -> bool {
-        self.id.as_ref() == &entry.id && self.target.as_ref() == &entry.target
-    }
-
-    /// Returns the byte at which the value that `error` is about starts.
-    fn start(&self, error: &TwinError) -> usize {
-        let id = self.id.span().start;
-        let of = |value: &Option<Spanned<String>>| value.as_ref().map(|v| v.span().start);
-        let other = of(&self.from).or(of(&self.to));
-        match error {
-            TwinError::EffectTarget { name, .. } if name == self.target.as_ref() => {
-                self.target.span().start
-            }
-            TwinError::DuplicateEffect { .. } => self.target.span().start,
-            TwinError::EffectTarget { .. }
-            | TwinError::EffectOnItself { .. }
-            | TwinError::OtherState { key: "from", .. } => other.unwrap_or(id),
-            TwinError::OtherState { .. } => of(&self.to).unwrap_or(id),
-            TwinError::UnknownMagnitude { name, .. } | TwinError::MagnitudeValue { name, .. } => {
-                (self.magnitudes.get(name)).map_or(id, |value| value.span().start)
-            }
-            _ => id,
-        }
-    }
-}
-
-/// Adds to the error of effect `index`, which is `entry`, its line in the text of the file.
-fn with_line(
-    error: TwinError,
-    (path, text): &(PathBuf, Arc<str>),
+/// Returns the line of the value that `error` is about in effect `index` of a text; none where that is not `entry`, since a caller may
+/// have changed the effects.
+fn line_of_effect(
+    text: &str,
     index: usize,
     entry: &EffectEntry,
-) -> StudyError {
-    let tables = toml::from_str::<Tables>(text).ok();
-    let keys = tables.as_ref().and_then(|tables| tables.effect.get(index));
-    match keys.filter(|keys| keys.is(entry)) {
-        Some(keys) => StudyError::EffectAt {
-            path: path.clone(),
-            line: line(text, keys.start(&error)),
-            error,
-        },
-        None => error.into(),
+    error: &TwinError,
+) -> Option<usize> {
+    let file = DeTable::parse(text).ok()?;
+    let table = file
+        .get_ref()
+        .get("effect")?
+        .get_ref()
+        .get(index)?
+        .get_ref();
+    let is = |key, name: &str| {
+        let value = table.get(key).and_then(|value| value.get_ref().as_str());
+        value == Some(name)
+    };
+    if !is("id", &entry.id) || !is("target", &entry.target) {
+        return None;
     }
+    let value = match error {
+        TwinError::EffectTarget { name, .. } if is("target", name) => table.get("target"),
+        TwinError::DuplicateEffect { .. } => table.get("target"),
+        TwinError::EffectTarget { .. }
+        | TwinError::EffectOnItself { .. }
+        | TwinError::OtherState { key: "from", .. } => table.get("from").or(table.get("to")),
+        TwinError::OtherState { .. } => table.get("to"),
+        TwinError::UnknownMagnitude { name, .. } | TwinError::MagnitudeValue { name, .. } => {
+            (table.get("magnitudes")).and_then(|magnitudes| magnitudes.get_ref().get(name))
+        }
+        _ => None,
+    };
+    Some(line(text, value.or(table.get("id"))?.span().start))
 }
 
 /// Returns the line, from 1, of a byte of a text.

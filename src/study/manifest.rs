@@ -1,6 +1,7 @@
 //! Settings of a study that its results depend on.
 
-use super::{InputPlan, Study};
+use super::{InputPlan, Study, StudyError};
+use crate::record::Signal;
 use crate::storage::StorageError;
 use crate::storage::files::sha256;
 use crate::storage::work::{Manifest, checksum};
@@ -31,20 +32,18 @@ impl Study {
 
     /// Checksum of a simulation at a point of the prior; of what is wrong with it, where it fails.
     fn simulation(&self) -> String {
-        let twin = self.twin();
         let noise = Noise::new(0, "manifest", 0);
-        let drive = (self.drives().map_err(|error| error.to_string()))
-            .and_then(|drives| drives.draw(noise).map_err(|error| error.to_string()));
-        let outputs = drive.and_then(|drive| {
-            let theta = twin.parameters().draw_prior(noise);
-            (twin.simulate(&theta, &drive, noise)).map_err(|error| error.to_string())
-        });
-        match outputs {
+        let simulated = || -> Result<Signal, StudyError> {
+            let drive = self.drives()?.draw(noise)?;
+            let theta = self.twin.parameters().draw_prior(noise);
+            Ok(self.twin.simulate(&theta, &drive, noise)?)
+        };
+        match simulated() {
             Ok(signal) => {
                 let bytes: Vec<u8> = (signal.iter()).flat_map(|v| v.to_le_bytes()).collect();
                 sha256(&bytes)
             }
-            Err(error) => error,
+            Err(error) => error.to_string(),
         }
     }
 }

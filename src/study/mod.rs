@@ -5,18 +5,17 @@ mod file;
 mod fit;
 mod manifest;
 mod plan;
-mod prior;
-mod shapes;
 mod suitability;
+mod tables;
 
 pub use error::StudyError;
 pub use file::StudyFile;
-pub(crate) use file::{Library, RecordTable};
 pub(crate) use plan::DriveSource;
 pub(crate) use plan::InputPlan;
 #[cfg(feature = "fmi")]
 pub(crate) use plan::Levels;
 pub use plan::RecordPlan;
+pub(crate) use tables::{Library, RecordTable};
 
 use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment};
 use crate::record::{Drive, Record};
@@ -61,15 +60,7 @@ pub struct Study {
     catalogue: Catalogue,
 }
 
-impl std::fmt::Debug for Study {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Study")
-            .field("name", &self.name)
-            .field("plan", &self.plan)
-            .field("file", &self.file)
-            .finish_non_exhaustive()
-    }
-}
+debug_by_name!(Study);
 
 impl Study {
     /// Creates a study of measured records. To simulate records, it needs a plan ([`Study::new`], or the study file).
@@ -188,8 +179,8 @@ impl Study {
         let fixed = |error: TwinError| StudyError::Table(format!("fixed: {error}"));
         let space = twin.parameters();
         for (name, &value) in &file.fixed {
-            let parameter = &space[space.position(name).map_err(fixed)?];
-            parameter.check_value(value).map_err(fixed)?;
+            let position = space.position(name);
+            (position.and_then(|at| space[at].check_value(value))).map_err(fixed)?;
         }
         let mut held = file.fixed.clone();
         held.extend(effects.iter().flat_map(Effect::given_by_parameter));
@@ -236,10 +227,10 @@ impl Study {
 
     /// Refuses a study of which nothing is left to estimate, where simulations are to teach an estimator.
     pub(crate) fn check_estimated(&self) -> Result<(), StudyError> {
-        if !self.twin.parameters().is_empty() {
-            return Ok(());
+        match self.twin.parameters().is_empty() {
+            true => Err(StudyError::AllFixed),
+            false => Ok(()),
         }
-        Err(StudyError::AllFixed)
     }
 
     /// Returns whether estimates may lean on the prior: `[prior] trust = true`.
@@ -250,13 +241,11 @@ impl Study {
     /// Returns the twin as registered, with the integrator, the substeps and the hold of a file.
     fn stepped(&self, record: &RecordTable) -> Result<Twin, StudyError> {
         let (integrator, substeps, hold) = (record.integrator, record.substeps, record.hold);
-        let given = [
-            (substeps.is_some(), "substeps"),
-            (integrator.is_some(), "integrator"),
-            (hold.is_some(), "hold"),
-        ];
-        let Some((_, key)) = given.into_iter().find(|(given, _)| *given) else {
-            return Ok(self.base.clone());
+        let key = match (substeps, integrator, hold) {
+            (Some(_), ..) => "substeps",
+            (_, Some(_), _) => "integrator",
+            (.., Some(_)) => "hold",
+            _ => return Ok(self.base.clone()),
         };
         if let Some(n) = substeps.filter(|n| !(1..=MOST_SUBSTEPS).contains(n)) {
             return Err(StudyError::Plan(format!(

@@ -1,15 +1,13 @@
 //! Plan of simulated records: step, length, input.
 
-use crate::math::six_digits;
-use crate::record::{Drive, Record, RecordError, Signal, Signals};
+use crate::math::{ends, six_digits};
+use crate::record::{Drive, MOST_SAMPLES, Record, RecordError, Signal, Signals};
 use crate::storage::untrusted::MOST_NUMBERS;
 use crate::study::error::StudyError;
 use crate::twin::{Interval, Noise};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Longest record that is simulated; as long as the longest that is read.
-const MOST_SAMPLES: usize = 50_000_000;
 /// Stretches of constant input in a record that is like a measured one.
 const HOLDS: usize = 15;
 
@@ -79,54 +77,39 @@ impl RecordPlan {
     /// A record like a measured one: its step and length, levels in the range of its inputs.
     pub(super) fn like(record: &Record) -> Self {
         let drive = record.drive();
-        let ends = drive.inputs().iter().fold(None, |ends, &u| match ends {
-            None => Some((u, u)),
-            Some((low, high)) => Some((u.min(low), u.max(high))),
-        });
-        let levels = ends.map(|(low, high)| {
-            InputPlan::Levels(Levels {
-                levels: Interval::unchecked(low, high),
-                hold: (record.samples() / HOLDS).max(1),
-            })
-        });
-        Self {
-            step: drive.dt(),
-            samples: record.samples(),
-            input: levels,
+        let (step, samples) = (drive.dt(), record.samples());
+        let inputs: Vec<f64> = drive.inputs().iter().copied().collect();
+        if inputs.is_empty() {
+            return Self::autonomous(step, samples);
         }
+        let (low, high) = ends(&inputs);
+        Self::levels(step, samples, low, high, (samples / HOLDS).max(1))
     }
 
     /// Checks step, length and levels; a file of inputs is not read.
     pub(super) fn check(&self, signals: &Signals) -> Result<(), StudyError> {
         let channels = signals.inputs.len();
         let all = channels + signals.outputs.len();
-        if self.samples > MOST_SAMPLES {
-            return Err(StudyError::Plan(format!(
-                "samples = {}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record",
-                self.samples
-            )));
-        }
-        if self.samples.saturating_mul(all) > MOST_NUMBERS {
-            return Err(StudyError::Plan(format!(
-                "samples = {} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record",
-                self.samples
-            )));
-        }
+        let samples = self.samples;
         let levels = match &self.input {
+            _ if samples > MOST_SAMPLES => Err(format!(
+                "samples = {samples}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record"
+            )),
+            _ if samples.saturating_mul(all) > MOST_NUMBERS => Err(format!(
+                "samples = {samples} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record"
+            )),
             Some(_) if channels == 0 => {
-                let problem = "input is given, but the twin has none; remove it";
-                return Err(StudyError::Plan(problem.into()));
+                Err("input is given, but the twin has none; remove it".into())
             }
             Some(InputPlan::Levels(Levels { hold: 0, .. })) => {
-                let problem = "hold = 0; a level is held for at least 1 sample";
-                return Err(StudyError::Plan(problem.into()));
+                Err("hold = 0; a level is held for at least 1 sample".into())
             }
-            Some(InputPlan::Levels(Levels { levels, .. })) => [levels.low(), levels.high()],
-            Some(InputPlan::File(_)) | None => [0.0; 2],
+            Some(InputPlan::Levels(Levels { levels, .. })) => Ok([levels.low(), levels.high()]),
+            Some(InputPlan::File(_)) | None => Ok([0.0; 2]),
         };
+        let levels = levels.map_err(StudyError::Plan)?;
         // The ends of the levels, one after the other, are what any drive is drawn between.
-        let samples = self.samples.min(levels.len());
-        let ends = Signal::from_shape_fn((samples, 1), |(k, _)| levels[k]);
+        let ends = Signal::from_shape_fn((samples.min(2), 1), |(k, _)| levels[k]);
         Drive::new(self.step, ends)?;
         Ok(())
     }
@@ -142,10 +125,8 @@ impl RecordPlan {
         let channels = signals.inputs.len();
         let fixed = match &self.input {
             None if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
-            None => {
-                return Err(StudyError::NoInput(channels));
-            }
-            Some(InputPlan::File(path)) => Some(self.read(path, channels)?),
+            None => return Err(StudyError::NoInput(channels)),
+            Some(InputPlan::File(path)) => Some(read(path, channels)?),
             Some(InputPlan::Levels(_)) => None,
         };
         Ok(DriveSource {
@@ -153,24 +134,6 @@ impl RecordPlan {
             channels,
             fixed,
         })
-    }
-
-    fn read(&self, path: &Path, channels: usize) -> Result<Drive, StudyError> {
-        let drive = Drive::read(path)?;
-        if !drive.is_uniform() {
-            return Err(StudyError::Plan(format!(
-                "{}, column t: the steps vary; simulated records need one step: resample the inputs",
-                path.display()
-            )));
-        }
-        let given = drive.inputs().ncols();
-        if given != channels {
-            return Err(StudyError::Plan(format!(
-                "{}: {given} inputs, the twin has {channels}; give each its column",
-                path.display()
-            )));
-        }
-        Ok(drive)
     }
 
     /// Checks whether a record has the study's step, to 1e-3 of it.
@@ -184,6 +147,19 @@ impl RecordPlan {
         }
         Ok(())
     }
+}
+
+/// Reads a file of inputs, one step and so many channels.
+fn read(path: &Path, channels: usize) -> Result<Drive, StudyError> {
+    let drive = Drive::read(path)?;
+    let given = drive.inputs().ncols();
+    let problem = match drive.is_uniform() {
+        true if given == channels => return Ok(drive),
+        true => format!(": {given} inputs, the twin has {channels}; give each its column"),
+        false => ", column t: the steps vary; simulated records need one step: resample the inputs"
+            .into(),
+    };
+    Err(StudyError::Plan(format!("{}{problem}", path.display())))
 }
 
 /// Draws the inputs of simulated records.

@@ -64,10 +64,8 @@ pub(super) fn check(
             }
             continue;
         }
-        let both =
-            |check: &dyn Fn(&[f64]) -> bool| check(&values) && !own.as_deref().is_some_and(check);
-        if both(&|values| clipped_ends(values).is_some())
-            && let Some((end, value, count)) = clipped_ends(&values)
+        if let Some((end, value, count)) = clipped_ends(&values)
+            && own.as_deref().and_then(clipped_ends).is_none()
         {
             let value = with_unit(value, &output.unit);
             warn(
@@ -77,8 +75,8 @@ pub(super) fn check(
                 ),
             );
         }
-        if both(&|values| coarse_step(values).is_some())
-            && let Some(step) = coarse_step(&values)
+        if let Some(step) = coarse_step(&values)
+            && own.as_deref().and_then(coarse_step).is_none()
         {
             let step = with_unit(step, &output.unit);
             warn(
@@ -120,15 +118,12 @@ fn clipped_ends(values: &[f64]) -> Option<(&'static str, f64, usize)> {
         return None;
     };
     let (low, high) = ends(values);
-    let at = |end: f64| {
-        values
-            .iter()
-            .filter(move |v| (**v - end).abs() <= CONSTANT * (high - low))
+    let (name, end) = match limits[1].is_finite() {
+        true => ("largest", high),
+        false => ("least", low),
     };
-    match limits[1].is_finite() {
-        true => Some(("largest", high, at(high).count())),
-        false => Some(("least", low, at(low).count())),
-    }
+    let at_end = |v: &&f64| (**v - end).abs() <= CONSTANT * (high - low);
+    Some((name, end, values.iter().filter(at_end).count()))
 }
 
 /// The step of values that are few.

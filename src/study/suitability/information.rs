@@ -34,12 +34,11 @@ pub(super) fn check(
     record: &Record,
     planned: Option<&Record>,
 ) -> (Finding, Vec<Knowable>) {
-    const CHECK: &str = "parameters";
     let mut parameters = match errors(study, record) {
         Ok(parameters) => parameters,
         Err(problem) => {
             let message = format!("expected errors are not known: {problem}");
-            return (Finding::warning(CHECK, message), vec![]);
+            return (Finding::warning("parameters", message), vec![]);
         }
     };
     let usual = planned.and_then(|planned| errors(study, planned).ok());
@@ -59,32 +58,30 @@ pub(super) fn check(
     let blamed = listed(&|p| unknown(p) && is_blamed(p));
     if !blamed.is_empty() {
         let message = format!(
-            "this record cannot tell {} (expected error in widths of the prior; {PRIOR_DEVIATION:.2} says no more than the prior); take a longer record or another input, or fix them in [fixed]",
+            "this record cannot tell {} (expected error in widths of the prior; {PRIOR_DEVIATION:.2} says no more than the prior); take a longer record or another input, or fix them",
             blamed.join(", ")
         );
-        return (Finding::warning(CHECK, message), parameters);
+        return (Finding::warning("parameters", message), parameters);
     }
     let all = listed(&|_| true).join(", ");
     let plain = listed(&unknown).join(", ");
-    let note = match plain.is_empty() {
-        true => String::new(),
-        false => format!("; {plain}: no more than the prior says, as in some planned records"),
+    let message = match (all.as_str(), plain.as_str()) {
+        ("", _) => "none to estimate".to_owned(),
+        (all, "") => format!("expected errors in widths of the prior: {all}"),
+        (all, plain) => format!(
+            "expected errors in widths of the prior: {all}; {plain}: no more than the prior says, as in some planned records"
+        ),
     };
-    let message = match all.is_empty() {
-        true => "none to estimate".to_owned(),
-        false => format!("expected errors in widths of the prior: {all}{note}"),
-    };
-    (Finding::pass(CHECK, message), parameters)
+    (Finding::pass("parameters", message), parameters)
 }
 
 /// Expected errors at the centre of the prior, noise levels and starts unknown as in a fit.
 fn errors(study: &Study, record: &Record) -> Result<Vec<Knowable>, String> {
     let records = std::slice::from_ref(record);
-    let text = |error: &dyn std::fmt::Display| error.to_string();
-    let measured = measured(study.twin(), records, &study.beliefs()).map_err(|e| text(&e))?;
+    let measured = measured(study.twin(), records, &study.beliefs()).map_err(|e| e.to_string())?;
     let problem = Problem::of_measured(&measured, records);
     // Without a step, a climb tells the information at its start.
-    let here = climb(&problem, &problem.centre(), 0).map_err(|e| text(&e))?;
+    let here = climb(&problem, &problem.centre(), 0).map_err(|e| e.to_string())?;
     let here = here.ok_or("the twin cannot be filtered at the centre of its prior")?;
     let errors = here.std_errors(&problem);
     let space = study.twin().parameters();

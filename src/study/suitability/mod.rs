@@ -27,7 +27,6 @@ use crate::record::{Drive, Record, Signal};
 use crate::setting::number;
 use crate::twin::Noise;
 use crate::twin::conformance::{Finding, Severity};
-use ndarray::s;
 
 /// Runs of the twin at draws of its prior, beside the one at the centre: one of them is near enough to any point of the prior for a
 /// comparison of sizes and shapes, and a slow simulator still answers within a minute or so.
@@ -42,14 +41,6 @@ pub(crate) struct Suitability {
     pub findings: Vec<Finding>,
     /// Expected errors of the parameters; empty where they cannot be told.
     pub parameters: Vec<Knowable>,
-}
-
-/// Runs of the twin under the inputs of a record.
-struct Runs {
-    /// With noise, at the centre of the prior.
-    centre: Option<Signal>,
-    /// With noise, at draws of the prior and at its centre; those that diverge are left out.
-    all: Vec<Signal>,
 }
 
 impl Study {
@@ -76,37 +67,32 @@ impl Study {
         progress: &Progress,
     ) -> Result<Suitability, StudyError> {
         let noise = Noise::new(seed, "suitability", 0);
-        let mut findings = Vec::new();
         if let Err(error) = record.check_channels(&self.twin.signals()) {
-            findings.push(Finding::failure(
-                "channels",
-                error.of_twin(&self.name).to_string(),
-            ));
+            let problem = error.of_twin(&self.name).to_string();
             return Ok(Suitability {
-                findings,
+                findings: vec![Finding::failure("channels", problem)],
                 parameters: vec![],
             });
         }
-        findings.push(Finding::pass("channels", self.described(record)));
-        let record = &beginning(record)?;
+        let mut findings = described(record);
+        // A channel may have no value at the beginning; the whole record has one.
+        let begin = record.first_part(record.samples().min(LOOKED_AT));
+        let record = begin.unwrap_or_else(|| record.clone());
         let stage = progress.stage("runs", DRAWS as usize + 4);
         // A plan without inputs is no fault of the record.
         let planned = (self.drives().ok()).and_then(|drives| drives.draw(noise).ok());
-        let reference = planned.and_then(|drive| self.planned(drive, noise));
+        let planned = planned.and_then(|drive| self.planned(drive, noise));
+        let planned_drive = planned.as_ref().map(Record::drive);
         stage.tick()?;
-        let constants = reference.as_ref().and_then(|r| self.time_constants(r));
-        let (mut found, unit) = time::check(self, record, constants);
-        findings.append(&mut found);
-        let drive = reference.as_ref().map(Record::drive);
-        let (mut found, factors) = size::check_inputs(self, record, drive);
-        findings.append(&mut found);
+        let constants = planned.as_ref().and_then(|r| self.time_constants(r));
+        let (found, unit) = time::check(self, &record, constants);
+        findings.extend(found);
+        let (found, factors) = size::check_inputs(self, &record, planned_drive);
+        findings.extend(found);
         // Further checks are not to repeat what is known: they see the record in the right units.
-        let mut record = time::in_seconds(record, unit)?;
-        record = size::divided(&record, &factors, size::Side::Inputs)?;
-        let mut runs = Runs {
-            centre: None,
-            all: vec![],
-        };
+        let record = size::with_inputs_divided(time::in_seconds(record, unit)?, &factors)?;
+        // With noise, at the centre of the prior and at draws of it; those that diverge are left out.
+        let (mut centre, mut runs) = (None, vec![]);
         let space = self.twin.parameters();
         for draw in 0..=DRAWS {
             let noise = noise.sample(draw);
@@ -114,29 +100,28 @@ impl Study {
                 0 => space.centre(),
                 _ => space.draw_prior(noise),
             };
-            let run = self.twin.simulate(&theta, record.drive(), noise);
-            if let Some(run) = run.ok().filter(|run| run.iter().all(|v| v.is_finite())) {
-                if draw == 0 {
-                    runs.centre = Some(run.clone());
-                }
-                runs.all.push(run);
+            let run = self.twin.simulate(&theta, record.drive(), noise).ok();
+            let run = run.filter(|run| run.iter().all(|v| v.is_finite()));
+            if draw == 0 {
+                centre.clone_from(&run);
             }
+            runs.extend(run);
             stage.tick()?;
         }
-        findings.append(&mut channels::check(
+        findings.extend(channels::check(
             self,
             &record,
-            drive,
-            runs.centre.as_ref(),
+            planned_drive,
+            centre.as_ref(),
         ));
-        let (mut found, order) = swapped::check(self, &record, &runs.all);
-        findings.append(&mut found);
-        record = swapped::in_order(&record, &order)?;
-        let (mut found, factors) = size::check_outputs(self, &record, &runs.all);
-        findings.append(&mut found);
-        record = size::divided(&record, &factors, size::Side::Outputs)?;
+        let (found, order) = swapped::check(self, &record, &runs);
+        findings.extend(found);
+        let record = swapped::in_order(&record, &order)?;
+        let (found, factors) = size::check_outputs(self, &record, &runs);
+        findings.extend(found);
+        let record = size::with_outputs_divided(record, &factors)?;
         stage.tick()?;
-        let (finding, parameters) = information::check(self, &record, reference.as_ref());
+        let (finding, parameters) = information::check(self, &record, planned.as_ref());
         findings.push(finding);
         stage.tick()?;
         Ok(Suitability {
@@ -162,36 +147,27 @@ impl Study {
         let (_, states) = problem.states(&theta).ok()?.pop()?;
         time_constants(&measured.twin, &theta, planned.drive(), &states)
     }
-
-    /// Length, step and gaps of a record.
-    fn described(&self, record: &Record) -> String {
-        let drive = record.drive();
-        let gaps = match record.missing() {
-            0 => String::new(),
-            n => format!(
-                "; {n} outputs are missing: `fit` and `diagnose` leave them out; for `estimate`, `truetwin resample R.csv --step {} --out R2.csv` closes short gaps",
-                text(drive.dt())
-            ),
-        };
-        format!(
-            "{} inputs, {} outputs, {} samples at {} s{gaps}",
-            drive.inputs().ncols(),
-            record.outputs().ncols(),
-            record.samples(),
-            text(drive.dt())
-        )
-    }
 }
 
-/// The first samples of a long record.
-fn beginning(record: &Record) -> Result<Record, StudyError> {
-    if record.samples() <= LOOKED_AT {
-        return Ok(record.clone());
+/// Length, step and gaps of a record.
+fn described(record: &Record) -> Vec<Finding> {
+    let drive = record.drive();
+    let size = format!(
+        "{} inputs, {} outputs, {} samples at {} s",
+        drive.inputs().ncols(),
+        record.outputs().ncols(),
+        record.samples(),
+        text(drive.dt())
+    );
+    let mut findings = vec![Finding::pass("channels", size)];
+    if !record.is_complete() {
+        let message = format!(
+            "{} outputs are missing: fits and diagnoses leave them out; an estimate needs the record resampled",
+            record.missing()
+        );
+        findings.push(Finding::pass("gaps", message));
     }
-    let outputs = record.outputs().slice(s![..LOOKED_AT, ..]).to_owned();
-    // A channel may have no value there; the whole record has one.
-    let begin = Record::new(record.drive().first(LOOKED_AT), outputs);
-    Ok(begin.unwrap_or_else(|_| record.clone()))
+    findings
 }
 
 /// The findings, or one that says that there are none.

@@ -20,13 +20,6 @@ const UNLIKE: f64 = 6.0;
 /// Times that the deviation of an output in the right unit may leave the range of the runs by.
 const USUAL: f64 = 2.0;
 
-/// Side of a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
-    Inputs,
-    Outputs,
-}
-
 /// Checks inputs against the plan; also returns the power of ten that each is too large by.
 pub(super) fn check_inputs(
     study: &Study,
@@ -35,7 +28,7 @@ pub(super) fn check_inputs(
 ) -> (Vec<Finding>, Vec<f64>) {
     let inputs = study.twin().signals().inputs;
     let (mut findings, mut factors) = (vec![], vec![1.0; inputs.len()]);
-    let Some(planned) = planned else {
+    let Some(planned) = planned.filter(|_| !inputs.is_empty()) else {
         return (findings, factors);
     };
     for (j, input) in inputs.iter().enumerate() {
@@ -45,45 +38,35 @@ pub(super) fn check_inputs(
         };
         let (_, values) = present(record.drive().inputs(), j);
         let (least, most) = ends(&values);
-        let unit = |value| with_unit(value, &input.unit);
         let given = format!(
-            "input {} lies in {} to {}",
+            "input {} lies in {} to {}, the study's in {} to {}",
             input.name,
             text(least),
-            unit(most)
+            with_unit(most, &input.unit),
+            text(low),
+            with_unit(high, &input.unit)
         );
-        let plan = format!("the study's in {} to {}", text(low), unit(high));
         let reach = largest(&values) / low.abs().max(high.abs());
-        let in_reach = |factor: f64| (REACHED.0..=REACHED.1).contains(&(reach / factor));
+        let in_reach = |factor: &f64| (REACHED.0..=REACHED.1).contains(&(reach / factor));
         let is_doubted = !(REACHED.0 / DOUBTED..=DOUBTED).contains(&reach);
-        if is_doubted && let Some(factor) = powers().find(|f| in_reach(*f)) {
-            findings.push(Finding::warning(
-                "scale",
-                format!(
-                    "{given}, {plan}; {} if the unit differs",
-                    conversion(factor)
-                ),
-            ));
+        if is_doubted && let Some(factor) = powers().find(in_reach) {
+            let message = format!("{given}; {} if the unit differs", conversion(factor));
+            findings.push(Finding::warning("scale", message));
             factors[j] = factor;
             continue;
         }
         let margin = MARGIN * (high - low);
-        let outside = (values.iter())
-            .filter(|v| **v < low - margin || **v > high + margin)
-            .count();
+        let range = low - margin..=high + margin;
+        let outside = values.iter().filter(|v| !range.contains(v)).count();
         if outside > 0 {
-            findings.push(Finding::warning(
-                "inputs",
-                format!(
-                    "{given}, {plan}: {outside} of {} rows are outside; an estimator has not seen such inputs: widen [record] input in a study file and pretrain again",
-                    values.len()
-                ),
-            ));
+            let message = format!(
+                "{given}: {outside} of {} rows are outside; an estimator has not seen such inputs: widen the input of the study and train it again",
+                values.len()
+            );
+            findings.push(Finding::warning("inputs", message));
         }
     }
-    if !inputs.is_empty() {
-        findings = or_pass(findings, "inputs", "within the study's range");
-    }
+    let findings = or_pass(findings, "inputs", "within the study's range");
     (findings, factors)
 }
 
@@ -95,61 +78,48 @@ pub(super) fn check_outputs(
 ) -> (Vec<Finding>, Vec<f64>) {
     let outputs = study.twin().signals().outputs;
     let (mut findings, mut factors) = (vec![], vec![1.0; outputs.len()]);
+    if runs.is_empty() {
+        let message = "the twin diverges under the record's inputs at every point of its prior; check units and prior";
+        return (vec![Finding::warning("scale", message)], factors);
+    }
     for (j, output) in outputs.iter().enumerate() {
         let own = deviation(&present(record.outputs(), j).1);
-        let sizes: Vec<f64> = runs
-            .iter()
-            .map(|run| deviation(&run.column(j).to_vec()))
-            .collect();
+        let sizes = runs.iter().map(|run| deviation(&run.column(j).to_vec()));
+        let sizes: Vec<f64> = sizes.collect();
         let (low, high) = ends(&sizes);
+        let beyond = |size: f64, times: f64| size > times * high || size < low / times;
+        if own == 0.0 || low == 0.0 || !beyond(own, DOUBTED) {
+            continue;
+        }
         let Ok(middle) = median(&sizes) else {
             continue;
         };
-        if own == 0.0 || low == 0.0 {
-            continue;
-        }
-        let beyond = |size: f64, times: f64| size > times * high || size < low / times;
-        if !beyond(own, DOUBTED) {
-            continue;
-        }
+        let off = |factor: &f64| (own / factor / middle).ln().abs();
         let nearest = powers()
             .filter(|factor| !beyond(own / factor, USUAL))
-            .min_by(|a, b| {
-                let off = |factor: f64| (own / factor / middle).ln().abs();
-                off(*a).total_cmp(&off(*b))
-            });
-        let unit = |value| with_unit(value, &output.unit);
-        let given = format!(
-            "output {} varies by {} rms, runs of the twin by {} to {}",
+            .min_by(|a, b| off(a).total_cmp(&off(b)));
+        let remedy = match nearest {
+            Some(factor) => format!(
+                "{} if the unit differs, or else widen the prior",
+                conversion(factor)
+            ),
+            None if beyond(own, UNLIKE) => {
+                "check its unit, and widen the prior if the unit is right".into()
+            }
+            None => continue,
+        };
+        let message = format!(
+            "output {} varies by {} rms, runs of the twin by {} to {}; {remedy}",
             output.name,
-            unit(own),
+            with_unit(own, &output.unit),
             text(low),
-            unit(high)
+            with_unit(high, &output.unit)
         );
-        if let Some(factor) = nearest {
-            findings.push(Finding::warning(
-                "scale",
-                format!(
-                    "{given}; {} if the unit differs, or else widen [prior]",
-                    conversion(factor)
-                ),
-            ));
-            factors[j] = factor;
-        } else if beyond(own, UNLIKE) {
-            findings.push(Finding::warning(
-                "scale",
-                format!("{given}; check its unit, and widen [prior] if the unit is right"),
-            ));
-        }
+        findings.push(Finding::warning("scale", message));
+        factors[j] = nearest.unwrap_or(1.0);
     }
-    let pass = "outputs vary as runs of the twin do";
-    match runs.is_empty() {
-        true => {
-            let message = "the twin diverges under the record's inputs at every point of its prior; check units and [prior]";
-            (vec![Finding::warning("scale", message)], factors)
-        }
-        false => (or_pass(findings, "scale", pass), factors),
-    }
+    let findings = or_pass(findings, "scale", "outputs vary as runs of the twin do");
+    (findings, factors)
 }
 
 /// Factors that a unit may be off by, the nearest first.
@@ -157,30 +127,32 @@ fn powers() -> impl Iterator<Item = f64> {
     (1..=POWERS).flat_map(|n| [10f64.powi(n), 10f64.powi(-n)])
 }
 
-fn conversion(factor: f64) -> String {
+/// The remedy for values that are too large by a factor.
+pub(super) fn conversion(factor: f64) -> String {
     match factor > 1.0 {
         true => format!("divide it by {}", text(factor)),
         false => format!("multiply it by {}", text(1.0 / factor)),
     }
 }
 
-/// The record with channels divided by these factors.
-pub(super) fn divided(record: &Record, factors: &[f64], side: Side) -> Result<Record, RecordError> {
-    let scaled = |signal: &Signal| {
-        let mut signal = signal.clone();
-        for (mut column, factor) in signal.columns_mut().into_iter().zip(factors) {
-            if *factor != 1.0 {
-                column.mapv_inplace(|value| value / factor);
-            }
-        }
-        signal
-    };
-    let drive = record.drive();
-    match side {
-        Side::Inputs => Record::new(
-            drive.with_inputs(scaled(drive.inputs()))?,
-            record.outputs().clone(),
-        ),
-        Side::Outputs => Record::new(drive.clone(), scaled(record.outputs())),
+/// The record with inputs divided by these factors.
+pub(super) fn with_inputs_divided(record: Record, factors: &[f64]) -> Result<Record, RecordError> {
+    let inputs = divided(record.drive().inputs(), factors);
+    Record::new(
+        record.drive().with_inputs(inputs)?,
+        record.outputs().clone(),
+    )
+}
+
+/// The record with outputs divided by these factors.
+pub(super) fn with_outputs_divided(record: Record, factors: &[f64]) -> Result<Record, RecordError> {
+    Record::new(record.drive().clone(), divided(record.outputs(), factors))
+}
+
+fn divided(signal: &Signal, factors: &[f64]) -> Signal {
+    let mut signal = signal.clone();
+    for (mut column, factor) in signal.columns_mut().into_iter().zip(factors) {
+        column /= *factor;
     }
+    signal
 }

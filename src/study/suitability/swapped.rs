@@ -34,7 +34,7 @@ pub(super) fn check(study: &Study, record: &Record, runs: &[Signal]) -> (Vec<Fin
                 findings.push(Finding::warning(
                     "swapped",
                     format!(
-                        "output {a} looks like {b} and {b} like {a}: correlations with the twin's runs {:.2} and {:.2}, as given {:.2} and {:.2}; swap the columns, as in --columns {a}=B,{b}=A",
+                        "output {a} looks like {b} and {b} like {a}: correlations with the twin's runs {:.2} and {:.2}, as given {:.2} and {:.2}; swap their columns",
                         other[0], other[1], own[0], own[1]
                     ),
                 ));

@@ -1,5 +1,6 @@
 //! Units of time, steps, sampling, length.
 
+use super::size::conversion;
 use super::{or_pass, text};
 use crate::record::{Drive, Record, RecordError};
 use crate::study::Study;
@@ -31,55 +32,46 @@ pub(super) fn check(
     let step = drive.dt();
     let plan = study.plan().map_or(step, |plan| plan.step);
     let length = drive.time(record.samples() - 1);
-    let fits = |unit: f64| match constants {
-        Some((fast, slow)) => step / unit <= 0.5 * fast && length / unit >= slow,
-        None => false,
-    };
-    let near = if constants.is_some() {
-        NEAR_PLAN
-    } else {
-        AS_PLANNED
+    let fits = |(fast, slow)| step <= 0.5 * fast && length >= slow;
+    let near = match constants {
+        Some(_) => NEAR_PLAN,
+        None => AS_PLANNED,
     };
     let like_plan = |unit: f64| (step / unit / plan).ln().abs() <= near.ln();
-    if !fits(1.0)
+    if !constants.is_some_and(fits)
         && let Some((unit, name)) = UNITS.into_iter().find(|(unit, _)| like_plan(*unit))
     {
-        let (operation, factor) = match unit > 1.0 {
-            true => ("divide", unit),
-            false => ("multiply", 1.0 / unit),
-        };
-        let finding = Finding::warning(
-            "time",
-            format!(
-                "a step of {} s, {} s in the study: t seems to be in {name}; {operation} it by {}",
-                text(step),
-                text(plan),
-                text(factor)
-            ),
-        );
-        return (vec![finding], unit);
-    }
-    let mut findings = vec![];
-    if !drive.is_uniform() {
-        let remedy = format!(
-            "`fit` takes them for a twin with equations, and so does `diagnose` where their median is the study's step; otherwise: truetwin resample R.csv --step {} --out R2.csv",
-            text(step)
-        );
-        findings.push(Finding::warning(
-            "step",
-            format!("the steps vary; {remedy}"),
-        ));
-    } else if (step / plan - 1.0).abs() > SAME {
         let message = format!(
-            "{} s, {} s in the study: `fit` takes any step, `diagnose` and `estimate` (features that are scores) with --step-of-record; otherwise: truetwin resample R.csv --step {} --out R2.csv, or [record] step = {} in the study",
+            "a step of {} s, {} s in the study: t seems to be in {name}; {}",
             text(step),
             text(plan),
-            text(plan),
+            conversion(unit)
+        );
+        return (vec![Finding::warning("time", message)], unit);
+    }
+    let mut findings = vec![];
+    let mut warn = |check, message| findings.push(Finding::warning(check, message));
+    if !drive.is_uniform() {
+        let message = format!(
+            "the steps vary; a fit takes them for a twin with equations, and so does a diagnosis where their median is the study's step; otherwise resample the record to {} s",
             text(step)
         );
-        findings.push(Finding::warning("step", message));
+        warn("step", message);
+    } else if (step / plan - 1.0).abs() > SAME {
+        let message = format!(
+            "{} s, {} s in the study: a fit takes any step; for a diagnosis or an estimate resample the record, change the step of the study, or let the twin step as the record does",
+            text(step),
+            text(plan)
+        );
+        warn("step", message);
     }
+    let mut pass = "the study's step".to_owned();
     if let Some((fast, slow)) = constants {
+        pass += &format!(
+            "; time constants of the twin: {} to {} s",
+            text(fast),
+            text(slow)
+        );
         if step > 0.5 * fast {
             let message = format!(
                 "a step of {} s is longer than half the twin's fastest time constant, {} s: fast motion is lost; record with a step of {} s or less",
@@ -87,33 +79,24 @@ pub(super) fn check(
                 text(fast),
                 text(0.5 * fast)
             );
-            findings.push(Finding::warning("sampling", message));
+            warn("sampling", message);
         }
         if length < slow {
             let message = format!(
-                "{} s, shorter than the twin's slowest time constant, {} s: slow motion cannot be told; record for {} s or more",
+                "{} s, shorter than the twin's slowest time constant, {slow} s: slow motion cannot be told; record for {slow} s or more",
                 text(length),
-                text(slow),
-                text(slow)
+                slow = text(slow)
             );
-            findings.push(Finding::warning("length", message));
+            warn("length", message);
         }
     }
-    let pass = match constants {
-        Some((fast, slow)) => format!(
-            "the study's step; time constants of the twin: {} to {} s",
-            text(fast),
-            text(slow)
-        ),
-        None => "the study's step".into(),
-    };
     (or_pass(findings, "time", &pass), 1.0)
 }
 
 /// The record with its times in seconds.
-pub(super) fn in_seconds(record: &Record, unit: f64) -> Result<Record, RecordError> {
+pub(super) fn in_seconds(record: Record, unit: f64) -> Result<Record, RecordError> {
     if unit == 1.0 {
-        return Ok(record.clone());
+        return Ok(record);
     }
     let drive = record.drive();
     let times: Vec<f64> = (0..record.samples())

@@ -1,0 +1,224 @@
+//! Tables of a study file.
+
+use crate::effect::EffectPattern;
+use crate::record::Columns;
+use crate::study::plan::InputPlan;
+use crate::twin::{Hold, Integrator, Interval};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::BTreeMap;
+use toml::de::{DeTable, DeValue};
+
+/// `[record]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecordTable {
+    /// Step in seconds.
+    pub step: Option<f64>,
+    /// Number of samples.
+    pub samples: Option<usize>,
+    /// Inputs.
+    pub input: Option<InputPlan>,
+    /// Inputs between samples, also of measured records.
+    pub hold: Option<Hold>,
+    /// Integrator of the twin, also for measured records.
+    pub integrator: Option<Integrator>,
+    /// Steps of the integrator within a sample, also of measured records.
+    pub substeps: Option<usize>,
+    /// Columns of measured records that do not have the usual names.
+    #[serde(skip_serializing_if = "Columns::is_empty")]
+    pub columns: Columns,
+}
+
+impl RecordTable {
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Returns `true` if it says what simulated records look like.
+    pub(crate) fn is_plan(&self) -> bool {
+        self.step.is_some() || self.samples.is_some() || self.input.is_some()
+    }
+}
+
+/// `[library]`: effects that a diagnosis may name.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Library {
+    /// These alone (all if empty): ids, or `id@target`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub only: Vec<EffectPattern>,
+    /// Not these.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<EffectPattern>,
+}
+
+impl Library {
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// Key of the flag, beside the names of parameters.
+const TRUST: &str = "trust";
+
+/// `[prior]`.
+///
+/// A box is where records are simulated for training. Unless it is trusted, an estimate does not lean on it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct PriorTable {
+    /// `true` if the parameters of every record lie in their boxes.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub trust: bool,
+    /// Boxes by name; names may be dotted.
+    #[serde(flatten)]
+    pub boxes: BTreeMap<String, Interval>,
+}
+
+impl PriorTable {
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl<'de> Deserialize<'de> for PriorTable {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut table = toml::Table::deserialize(deserializer)?;
+        // A parameter may bear the flag's name: its value is a box.
+        let flag = table.get(TRUST).and_then(toml::Value::as_bool);
+        if flag.is_some() {
+            table.remove(TRUST);
+        }
+        Ok(Self {
+            trust: flag.unwrap_or(false),
+            boxes: flat(table)?,
+        })
+    }
+}
+
+/// Reads a table whose keys may be dotted: `start.h1 = …` is the key `start.h1`.
+pub(super) fn dotted<'de, D: Deserializer<'de>, V: DeserializeOwned>(
+    deserializer: D,
+) -> Result<BTreeMap<String, V>, D::Error> {
+    flat(toml::Table::deserialize(deserializer)?)
+}
+
+fn flat<V: DeserializeOwned, E: serde::de::Error>(
+    table: toml::Table,
+) -> Result<BTreeMap<String, V>, E> {
+    let mut flat = BTreeMap::new();
+    flatten("", table, &mut flat).map_err(E::custom)?;
+    Ok(flat)
+}
+
+/// Adds the values of a table and its inner tables to `flat`, by dotted names.
+fn flatten<V: DeserializeOwned>(
+    prefix: &str,
+    table: toml::Table,
+    flat: &mut BTreeMap<String, V>,
+) -> Result<(), String> {
+    for (key, value) in table {
+        let key = format!("{prefix}{key}");
+        match value {
+            toml::Value::Table(inner) => flatten(&format!("{key}."), inner, flat)?,
+            value => {
+                let value = V::deserialize(value).map_err(|e| format!("{key}: {}", e.message()))?;
+                flat.insert(key, value);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Tables of a study file.
+const TABLES: [&str; 9] = [
+    "record", "prior", "bounds", "fixed", "limits", "noise", "start", "features", "library",
+];
+/// Tables of intervals.
+const INTERVALS: [&str; 3] = ["prior", "bounds", "limits"];
+
+/// Checks that tables are tables and intervals have two ends, which a parser does not: it takes lists for tables, and what stands behind
+/// two ends. Returns the byte of the first that is wrong, and the problem.
+pub(super) fn check_shapes(file: &DeTable<'_>) -> Result<(), (usize, String)> {
+    for name in TABLES {
+        let Some(value) = file.get(name) else {
+            continue;
+        };
+        match value.get_ref() {
+            DeValue::Table(table) => check_table(name, table)?,
+            _ => {
+                let problem = format!("{name} is a table; write [{name}], and its keys below");
+                return Err((value.span().start, problem));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
+    let keeps_intervals = INTERVALS.contains(&name);
+    for (key, value) in table {
+        let key = key.get_ref();
+        let problem = match value.get_ref() {
+            DeValue::Table(inner) if inner.is_empty() && name != "features" => {
+                "is empty; remove it"
+            }
+            DeValue::Table(inner) if keeps_intervals || name == "fixed" => {
+                check_table(name, inner)?;
+                continue;
+            }
+            value if name == "prior" && key == TRUST && !value.is_bool() => "is true or false",
+            DeValue::Array(ends) if keeps_intervals && ends.len() != 2 => {
+                "has two ends: write [low, high]"
+            }
+            DeValue::Array(_) if name == "noise" => {
+                "is no list; give a standard deviation, or { std = .., known = true }"
+            }
+            DeValue::Array(_) if name == "start" => {
+                "is no list; give a value, \"estimate\", or { mean = .., std = .. }"
+            }
+            _ => continue,
+        };
+        return Err((value.span().start, format!("[{name}] {key} {problem}")));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_flag_stands_among_the_boxes() {
+        let text = "trust = true\nk1 = [0.1, 0.5]\n\"start.h1\" = [0.0, 2.0]\n";
+        let table: PriorTable = toml::from_str(text).unwrap();
+        assert!(table.trust && table.boxes.len() == 2);
+        let again: PriorTable = toml::from_str(&toml::to_string(&table).unwrap()).unwrap();
+        assert_eq!(again, table);
+        let parameter: PriorTable = toml::from_str("trust = [0.0, 1.0]").unwrap();
+        assert!(!parameter.trust && parameter.boxes.contains_key(TRUST));
+        let wrong = toml::from_str::<PriorTable>("trust = 'yes'").unwrap_err();
+        assert!(wrong.to_string().contains(TRUST), "{wrong}");
+    }
+
+    #[test]
+    fn lists_are_no_tables_and_intervals_have_two_ends() {
+        for (text, part) in [
+            ("record = [0.5, 80]", "write [record]"),
+            ("[limits]\nh1 = [0, 5, 'x']", "[limits] h1 has two ends"),
+            ("[prior]\nstart.h1 = [1.0]", "[prior] h1 has two ends"),
+            ("[prior]\ntrust = 'yes'", "[prior] trust is true or false"),
+            ("[prior]\nk1 = {}", "[prior] k1 is empty"),
+            ("[start]\nh1 = [1, 2]", "[start] h1 is no list"),
+            ("[noise]\nh1 = [0.1, true]", "[noise] h1 is no list"),
+        ] {
+            let (_, problem) = check_shapes(DeTable::parse(text).unwrap().get_ref()).unwrap_err();
+            assert!(problem.contains(part), "{problem}");
+        }
+        let fine = "[prior]\nk1 = [0, 1]\nstart.h1 = [0, 1]\ntrust = true\n[noise]\nh1 = { std = 0.1 }\n[features]\nkind = 'score'";
+        assert_eq!(
+            check_shapes(DeTable::parse(fine).unwrap().get_ref()),
+            Ok(())
+        );
+    }
+}
