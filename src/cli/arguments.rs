@@ -35,22 +35,17 @@ pub(super) struct Arguments {
 const EXIT: &str = "Exit codes: 0 done; 2 wrong call or file (one line names the problem, the place and the remedy); 130 stopped by Ctrl-C; \
      1 internal error.";
 
-/// The whole command line.
+/// Creates the whole command line.
 pub(super) fn command() -> Command {
     let with_exit = |command: Command| {
-        let text = match command.get_after_help() {
-            Some(text) => format!("{text}\n\n{EXIT}"),
-            None => EXIT.into(),
-        };
+        let own = command.get_after_help().map(|text| format!("{text}\n\n"));
+        let text = own.unwrap_or_default() + EXIT;
         command.after_help(text)
     };
     // `--seed -1` is a wrong number, not an unknown option.
     let signed = |argument: Arg| {
         let takes_value = argument.get_action().takes_values() && !argument.is_positional();
-        match takes_value {
-            true => argument.allow_negative_numbers(true),
-            false => argument,
-        }
+        argument.allow_negative_numbers(takes_value)
     };
     with_exit(Arguments::command().mut_args(signed))
         .mut_subcommands(|verb| with_exit(verb.mut_args(signed)))

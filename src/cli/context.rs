@@ -1,6 +1,6 @@
 //! The interface between the command line and its verbs.
 
-use super::failure::Failure;
+use super::failure::{Failure, InFile};
 use super::options::Subject;
 use super::output;
 use crate::estimator::Project;
@@ -9,17 +9,12 @@ use crate::storage::work::{Ranks, Share};
 use crate::study::{Study, StudyError, StudyFile};
 use clap::Command;
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// A verb: its options and its work.
 pub(super) trait Verb {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure>;
-
-    /// The twin of the call, for verbs that need one.
-    fn subject(&self) -> Option<&Subject> {
-        None
-    }
 
     /// Tells whether rerunning the same command resumes the work: what ranks share lies in a folder.
     fn is_resumed(&self) -> bool {
@@ -42,6 +37,8 @@ pub(super) struct Context<'a> {
     pub program: &'a str,
     /// The call, without options that change no result.
     pub call: String,
+    /// The study file of the call.
+    pub study_file: Option<PathBuf>,
     pub json: bool,
     pub seed: u64,
     pub progress: &'a Progress,
@@ -58,40 +55,27 @@ impl Context<'_> {
 
     /// As [`study`](Self::study), with the recipes.
     pub fn project(&self, subject: &Subject) -> Result<Project, Failure> {
-        match (&subject.twin, &subject.study) {
-            (Some(name), _) => Ok(self.named(name)?.clone()),
-            (None, Some(path)) => {
-                let file = StudyFile::read(path)?;
-                let at = |failure: Failure| failure.within(path);
-                let project = self.named(&file.twin).map_err(at)?;
-                project.configure(&file).map_err(|error| at(error.into()))
-            }
-            (None, None) => (self.external.cloned()).ok_or_else(|| {
+        let (project, option) = match (&subject.twin, &subject.study) {
+            (Some(name), _) => (self.named(name)?.clone(), "--twin"),
+            (None, Some(path)) => (self.configured(path)?, "--study"),
+            (None, None) => return self.external.cloned().ok_or_else(|| {
                 Failure::user(
                     "no twin given; add --twin NAME (`truetwin twins` lists them), --study S.toml, --program 'COMMAND', or --fmu M.fmu",
                 )
             }),
-        }
-    }
-
-    /// Refuses a program or FMU beside `--twin` or `--study` of another twin: it would be ignored.
-    pub fn check_external_is_used(&self, subject: &Subject) -> Result<(), Failure> {
-        if self.external.is_none() {
-            return Ok(());
-        }
-        let (option, name) = match (&subject.twin, &subject.study) {
-            (Some(name), _) => ("--twin", name.clone()),
-            (None, Some(path)) => ("--study", StudyFile::read(path)?.twin),
-            (None, None) => return Ok(()),
         };
-        // An unknown name is refused where the twin is looked up, with the known ones.
-        match self.named(&name) {
-            Ok(_) => self.check_external_is(&name, option),
-            Err(_) => Ok(()),
-        }
+        self.check_external_is(project.study().name(), option)?;
+        Ok(project)
     }
 
-    /// Refuses a program or FMU with another twin than the one that `option` names.
+    /// Returns the project of a study file.
+    pub fn configured(&self, path: &Path) -> Result<Project, Failure> {
+        let file = StudyFile::read(path)?;
+        let project = self.named(&file.twin).in_file(path)?;
+        project.configure(&file).in_file(path)
+    }
+
+    /// Refuses a program or FMU with another twin than the one that `option` names: it would be ignored.
     pub fn check_external_is(&self, name: &str, option: &str) -> Result<(), Failure> {
         match self.external.map(|project| project.study().name()) {
             Some(external) if external != name => Err(Failure::user(format!(
@@ -104,22 +88,21 @@ impl Context<'_> {
     /// Returns the share of this process in numbered work: that of `--shard`, or of its rank.
     pub fn share(&self, asked: Option<Share>) -> Result<Share, Failure> {
         match asked {
-            None => Ok(self.ranks.share()),
-            Some(share) if self.ranks.is_alone() => Ok(share),
-            Some(_) => Err(Failure::user(
+            Some(_) if !self.ranks.is_alone() => Err(Failure::user(
                 "--shard cannot be used under mpirun, where ranks share the work; remove it",
             )),
+            asked => Ok(asked.unwrap_or(self.ranks.share())),
         }
     }
 
     pub fn named(&self, name: &str) -> Result<&Project, Failure> {
-        let names = || self.projects.iter().map(|project| project.study().name());
-        let project = names().position(|other| other == name);
-        let unknown = || StudyError::Twin {
-            given: name.into(),
-            known: names().collect::<Vec<_>>().join(", "),
-        };
-        Ok(&self.projects[project.ok_or_else(unknown)?])
+        let mut projects = self.projects.iter();
+        let project = projects.find(|project| project.study().name() == name);
+        project.ok_or_else(|| {
+            let known: Vec<&str> = self.projects.iter().map(|p| p.study().name()).collect();
+            let (given, known) = (name.into(), known.join(", "));
+            StudyError::Twin { given, known }.into()
+        })
     }
 
     /// Prints a result: JSON if asked for, else text, if there is any.

@@ -31,28 +31,18 @@ pub(super) fn study(options: &External, registered: &[Project]) -> Result<Option
 /// Refuses options without the program or FMU that they configure.
 fn check_options(options: &External) -> Result<(), Failure> {
     let (program, fmu) = (options.program.is_some(), options.fmu.is_some());
-    let rules = [
-        (program && fmu, "--fmu", "give either --program or --fmu"),
-        (
-            options.workers.is_some() && !program && !fmu,
-            "--workers",
-            "needs a program or an FMU; add --program 'COMMAND' or --fmu M.fmu, or remove it",
-        ),
-        (
-            options.timeout.is_some() && !program,
-            "--timeout",
-            "needs a program; add --program 'COMMAND', or remove it",
-        ),
-        (
-            !options.variables.is_empty() && !fmu,
-            "--variables",
-            "needs an FMU; add --fmu M.fmu, or remove it",
-        ),
-    ];
-    match rules.iter().find(|(wrong, ..)| *wrong) {
-        Some((_, option, remedy)) => Err(Failure::user(format!("{option}: {remedy}"))),
-        None => Ok(()),
-    }
+    let problem = if program && fmu {
+        "--fmu: give either --program or --fmu"
+    } else if options.workers.is_some() && !program && !fmu {
+        "--workers: needs a program or an FMU; add --program 'COMMAND' or --fmu M.fmu, or remove it"
+    } else if options.timeout.is_some() && !program {
+        "--timeout: needs a program; add --program 'COMMAND', or remove it"
+    } else if !options.variables.is_empty() && !fmu {
+        "--variables: needs an FMU; add --fmu M.fmu, or remove it"
+    } else {
+        return Ok(());
+    };
+    Err(Failure::user(problem))
 }
 
 fn program(options: &External, line: &str) -> Result<Study, Failure> {

@@ -1,20 +1,18 @@
-//! Turns errors into one line and an exit code.
+//! Messages on standard error; errors as one line and an exit code.
 
 use super::remedy::{Cause, Remedy};
-use super::say::say;
-use crate::storage::untrusted::one_line;
+use crate::storage::untrusted::{one_line, printable};
 use crate::storage::work::Ranks;
 use crate::study::StudyError;
 use std::fmt::Display;
+use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
 /// Most characters of a message: it may quote what was given.
 const LONGEST: usize = 2000;
-/// Exit code of a wrong call or file.
-const USER: u8 = 2;
-/// Exit code of everything else.
-const INTERNAL: u8 = 1;
+/// Exit code of a process stopped by Ctrl-C.
+pub(super) const STOPPED: u8 = 130;
 
 /// Words of the standard library for text that is no number, and what is expected in place of it.
 const NUMBERS: [(&str, &str); 6] = [
@@ -34,54 +32,40 @@ const NUMBERS: [(&str, &str); 6] = [
 const WHOLE: &str =
     "expected a whole number in digits, such as 100, without sign, point or exponent";
 
+/// Prints a message to standard error; a closed pipe is ignored.
+pub(super) fn say(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{}", printable(text));
+}
+
 /// The reason why a verb ended early.
 #[derive(Debug)]
 pub(super) struct Failure {
     message: String,
-    code: u8,
-    /// The study file may be the cause.
-    about_study: bool,
+    cause: Cause,
 }
 
 impl Failure {
     /// Creates a failure that the user can fix; the message tells how.
     pub fn user(message: impl Display) -> Self {
-        Self {
-            message: message.to_string(),
-            code: USER,
-            about_study: false,
-        }
-    }
-
-    /// Creates a failure whose cause may be the study file.
-    fn study(message: impl Display) -> Self {
-        Self {
-            about_study: true,
-            ..Self::user(message)
-        }
+        Self::new(message, Cause::Call)
     }
 
     /// Creates a failure that the user cannot fix.
     pub fn internal(message: impl Display) -> Self {
-        Self {
-            code: INTERNAL,
-            ..Self::user(message)
-        }
+        Self::new(message, Cause::Internal)
+    }
+
+    pub fn new(message: impl Display, cause: Cause) -> Self {
+        let message = message.to_string();
+        Self { message, cause }
     }
 
     /// Creates the failure of a diagnosis: its records or options are wrong, the study file was accepted.
     pub fn diagnosis(error: StudyError) -> Self {
+        let cause = Cause::Call;
         Self {
-            about_study: false,
+            cause,
             ..error.into()
-        }
-    }
-
-    /// Creates the failure of a call that the user has stopped.
-    pub fn stopped(message: impl Display, code: u8) -> Self {
-        Self {
-            code,
-            ..Self::user(message)
         }
     }
 
@@ -116,7 +100,7 @@ impl Failure {
     /// Adds the study file if it may be the cause.
     pub fn of_study(self, path: Option<&Path>) -> Self {
         match path {
-            Some(path) if self.about_study => self.within(path),
+            Some(path) if matches!(self.cause, Cause::Study) => self.within(path),
             _ => self,
         }
     }
@@ -139,22 +123,25 @@ impl Failure {
 
     /// The exit code.
     pub fn code(&self) -> u8 {
-        self.code
+        match self.cause {
+            Cause::Call | Cause::Study => 2,
+            Cause::Internal => 1,
+            Cause::Stop => STOPPED,
+        }
     }
 
     /// Reports a failure that all ranks share; the root rank prints it.
     pub fn report_of(self, ranks: &Ranks) -> ExitCode {
-        if ranks.is_root() {
-            self.report()
-        } else {
-            ExitCode::from(self.code)
+        match ranks.is_root() {
+            true => self.report(),
+            false => ExitCode::from(self.code()),
         }
     }
 
     /// Prints the line and gives the exit code.
     pub fn report(self) -> ExitCode {
         say(&format!("error: {}", one_line(&self.message, LONGEST)));
-        ExitCode::from(self.code)
+        ExitCode::from(self.code())
     }
 }
 
@@ -164,10 +151,17 @@ impl<E: Remedy + Display> From<E> for Failure {
             Some(remedy) => format!("{error} ({remedy})"),
             None => error.to_string(),
         };
-        match error.cause() {
-            Cause::Call => Self::user(message),
-            Cause::Study => Self::study(message),
-            Cause::Internal => Self::internal(message),
-        }
+        Self::new(message, error.cause())
+    }
+}
+
+/// Adds the file that an error is about.
+pub(super) trait InFile<T> {
+    fn in_file(self, path: &Path) -> Result<T, Failure>;
+}
+
+impl<T, E: Into<Failure>> InFile<T> for Result<T, E> {
+    fn in_file(self, path: &Path) -> Result<T, Failure> {
+        self.map_err(|error| error.into().within(path))
     }
 }

@@ -26,7 +26,6 @@ mod progress;
 mod provenance;
 mod records;
 mod remedy;
-mod say;
 mod stop;
 mod verbs;
 
@@ -34,13 +33,13 @@ use crate::estimator::Project;
 use crate::storage::StorageError;
 use crate::storage::work::Ranks;
 use crate::study::StudyError;
-use arguments::Arguments;
-use clap::FromArgMatches;
+use arguments::{Arguments, command};
+use clap::{ArgMatches, FromArgMatches};
 use context::Context;
-use failure::Failure;
+use failure::{Failure, STOPPED};
 use std::error::Error;
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Upper limit of --threads: larger numbers are typing errors.
@@ -50,42 +49,31 @@ const MOST_THREADS: usize = 1024;
 pub fn run<P: Into<Project>, E: Into<StudyError>>(
     projects: impl IntoIterator<Item = Result<P, E>>,
 ) -> ExitCode {
-    run_from(projects, std::env::args_os())
-}
-
-/// Runs the command line `arguments`, the program's name first, over studies or projects.
-fn run_from<P: Into<Project>, E: Into<StudyError>>(
-    projects: impl IntoIterator<Item = Result<P, E>>,
-    arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
-) -> ExitCode {
     let ranks = match Ranks::join() {
         Ok(ranks) => ranks,
         Err(error) => return Failure::from(error).report(),
     };
-    let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
-    let matches = arguments::command().try_get_matches_from(&words);
-    let parsed = match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
+    let words: Vec<OsString> = std::env::args_os().collect();
+    let parsed = command()
+        .try_get_matches_from(&words)
+        .and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, study_file(&matches))));
+    let (arguments, study_file) = match parsed {
         Ok(parsed) => parsed,
-        Err(error) if !error.use_stderr() => {
-            // Help and version are results.
-            let shown = if ranks.is_root() {
-                output::print(&error.to_string())
-            } else {
-                Ok(())
+        // Help and version are results.
+        Err(shown) if !shown.use_stderr() => {
+            let printed = match ranks.is_root() {
+                true => output::print(&shown.to_string()),
+                false => Ok(()),
             };
-            return shown.map_or_else(Failure::report, |()| ExitCode::SUCCESS);
+            return printed.map_or_else(Failure::report, |()| ExitCode::SUCCESS);
         }
         Err(error) => return Failure::usage(&error).report_of(&ranks),
     };
-    let verb = parsed.command.verb();
+    let verb = arguments.command.verb();
     if !ranks.is_alone() && !verb.is_shared_out() {
         let failure = Failure::user("this verb runs in one process; start it without mpirun");
         return failure.report_of(&ranks);
     }
-    let program = (words.first())
-        .and_then(|word| Some(Path::new(word).file_stem()?.to_str()?.to_owned()))
-        .unwrap_or_else(|| "truetwin".into());
-    let call = provenance::call(&program, &words);
     stop::listen();
     stop::report_file_size_limit();
     let projects: Result<Vec<Project>, E> = (projects.into_iter())
@@ -94,24 +82,27 @@ fn run_from<P: Into<Project>, E: Into<StudyError>>(
     let result = projects
         .map_err(|error| Failure::from(error.into()))
         .and_then(|projects| {
-            in_pool(parsed.threads, || {
-                dispatch(&parsed, &program, call, &projects, &ranks)
-            })
+            let call = Call {
+                arguments: &arguments,
+                words: &words,
+                study_file,
+            };
+            in_pool(arguments.threads, || call.dispatch(&projects, &ranks))
         });
-    match result {
-        Ok(code) => code,
-        Err(_) if stop::asked() => {
-            let exit = stop::failure(verb, &words).report_of(&ranks);
-            ranks.abandon(stop::CODE);
-            exit
-        }
-        Err(failure) => {
-            let code = failure.code();
-            let exit = failure.report();
-            ranks.abandon(code);
-            exit
-        }
-    }
+    result.unwrap_or_else(|failure| {
+        let (code, exit) = match stop::asked() {
+            true => (STOPPED, stop::failure(verb, &words).report_of(&ranks)),
+            false => (failure.code(), failure.report()),
+        };
+        ranks.abandon(code);
+        exit
+    })
+}
+
+/// Returns the study file of a call.
+fn study_file(matches: &ArgMatches) -> Option<PathBuf> {
+    let (_, verb) = matches.subcommand()?;
+    verb.try_get_one("study").ok().flatten().cloned()
 }
 
 /// Runs `work` in its own pool if a number of threads is given, else in the global one.
@@ -139,35 +130,38 @@ fn in_pool<R: Send>(
     }
 }
 
-fn dispatch(
-    arguments: &Arguments,
-    program: &str,
-    call: String,
-    registered: &[Project],
-    ranks: &Ranks,
-) -> Result<ExitCode, Failure> {
-    let progress = if ranks.is_root() {
-        progress::bars()
-    } else {
-        progress::bars().unshown()
-    };
-    let external = external::study(&arguments.external, registered)?.map(Project::from);
-    let projects: Vec<Project> = registered.iter().chain(&external).cloned().collect();
-    let context = Context {
-        projects: &projects,
-        external: external.as_ref(),
-        program,
-        call,
-        json: arguments.json,
-        seed: arguments.seed,
-        progress: &progress,
-        ranks,
-        command: arguments::command,
-    };
-    let verb = arguments.command.verb();
-    if let Some(subject) = verb.subject() {
-        context.check_external_is_used(subject)?;
+/// A call of the program.
+struct Call<'a> {
+    arguments: &'a Arguments,
+    words: &'a [OsString],
+    study_file: Option<PathBuf>,
+}
+
+impl Call<'_> {
+    fn dispatch(self, registered: &[Project], ranks: &Ranks) -> Result<ExitCode, Failure> {
+        let progress = match ranks.is_root() {
+            true => progress::bars(),
+            false => progress::bars().unshown(),
+        };
+        let arguments = self.arguments;
+        let external = external::study(&arguments.external, registered)?.map(Project::from);
+        let projects: Vec<Project> = registered.iter().chain(&external).cloned().collect();
+        let program = (self.words.first())
+            .and_then(|word| Path::new(word).file_stem()?.to_str())
+            .unwrap_or("truetwin");
+        let context = Context {
+            projects: &projects,
+            external: external.as_ref(),
+            program,
+            call: provenance::call(program, self.words),
+            study_file: self.study_file,
+            json: arguments.json,
+            seed: arguments.seed,
+            progress: &progress,
+            ranks,
+            command,
+        };
+        (arguments.command.verb().run(&context))
+            .map_err(|failure| failure.of_study(context.study_file.as_deref()))
     }
-    let study = verb.subject().and_then(|subject| subject.study.as_deref());
-    (verb.run(&context)).map_err(|failure| failure.of_study(study))
 }

@@ -1,12 +1,11 @@
 //! Output: standard output and error, and folders that appear complete.
 
 use super::failure::Failure;
-pub(super) use super::say::say;
+pub(super) use super::failure::say;
 use crate::storage::files::{folder, with_remedy};
 use crate::storage::untrusted::{hidden, printable};
-use crate::storage::{self, StorageError, sweep_beside};
+use crate::storage::{NewFolder, StorageError, sweep_beside};
 use serde_json::Value;
-use std::borrow::Cow;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -27,25 +26,19 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
 
 /// Prints one JSON object.
 pub(super) fn print_json(value: &Value) -> Result<(), Failure> {
-    let text = serde_json::to_string_pretty(value).map_err(Failure::internal)?;
-    print(&hidden_escaped(&text))
+    print(&hidden_escaped(&format!("{value:#}")))
 }
 
 /// Escapes hidden characters in the strings of a JSON text.
-fn hidden_escaped(json: &str) -> Cow<'_, str> {
-    let odd = |c: char| hidden(c) && c != '\n';
-    if !json.contains(odd) {
-        return Cow::Borrowed(json);
-    }
-    let mut text = String::with_capacity(json.len() + 16);
+fn hidden_escaped(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
     for c in json.chars() {
-        if odd(c) {
-            text.push_str(&format!("\\u{:04x}", u32::from(c)))
-        } else {
-            text.push(c)
+        match hidden(c) && c != '\n' {
+            true => text += &format!("\\u{:04x}", u32::from(c)),
+            false => text.push(c),
         }
     }
-    Cow::Owned(text)
+    text
 }
 
 /// Refuses an existing path or a missing parent folder, before the work starts; removes leftovers of killed processes there.
@@ -63,54 +56,21 @@ pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
 
 /// Refuses a missing parent folder, before the work starts.
 pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
-    if folder(path).is_dir() {
-        Ok(())
-    } else {
-        Err(StorageError::NoParent { path: path.into() }.into())
+    match folder(path).is_dir() {
+        true => Ok(()),
+        false => Err(StorageError::NoParent(path.into()).into()),
     }
 }
 
-/// An output folder that appears complete: it is filled beside its place and then moved.
-pub(super) struct NewFolder {
-    place: PathBuf,
-    filling: storage::NewFolder,
+/// Creates the output folder before the work starts, so that another run with the same `--out` is refused. It appears complete.
+pub(super) fn new_folder(place: &Path) -> Result<NewFolder, Failure> {
+    check_new(place)?;
+    Ok(NewFolder::claim(place)?)
 }
 
-impl NewFolder {
-    /// Creates the folder before the work starts, so that another run with the same `--out` is refused.
-    pub fn new(place: &Path) -> Result<Self, Failure> {
-        check_new(place)?;
-        Ok(Self {
-            filling: storage::NewFolder::claim(place)?,
-            place: place.into(),
-        })
-    }
-
-    /// As [`new`](Self::new), for an option that may be absent.
-    pub fn asked(place: &Option<PathBuf>) -> Result<Option<Self>, Failure> {
-        place.as_deref().map(Self::new).transpose()
-    }
-
-    /// Path of a file while the folder is filled.
-    pub fn file(&self, name: &str) -> PathBuf {
-        self.filling.file(name)
-    }
-
-    /// Writes an indented JSON object.
-    pub fn write_json(&self, name: &str, value: &Value) -> Result<(), Failure> {
-        let text = serde_json::to_string_pretty(value).map_err(Failure::internal)?;
-        self.write(name, &text)
-    }
-
-    pub fn write(&self, name: &str, text: &str) -> Result<(), Failure> {
-        fs::write(self.file(name), text)
-            .map_err(|error| StorageError::io(&self.place.join(name), error).into())
-    }
-
-    /// Moves the folder to its place.
-    pub fn finish(self) -> Result<(), Failure> {
-        (self.filling.finish()).map_err(|error| StorageError::io(&self.place, error).into())
-    }
+/// As [`new_folder`], for an option that may be absent.
+pub(super) fn asked_folder(place: &Option<PathBuf>) -> Result<Option<NewFolder>, Failure> {
+    place.as_deref().map(new_folder).transpose()
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! Posterior draws in files.
 
 use super::failure::Failure;
-use super::output::NewFolder;
 use crate::estimator::bank::file::write_matrices;
 use crate::fit::Posterior;
 use crate::report::posterior_svg;
+use crate::storage::NewFolder;
 use crate::study::Study;
 use clap::Args;
 use ndarray::Array2;
@@ -47,11 +47,11 @@ pub(super) fn write(
         csv.write_record(cells).map_err(Failure::internal)?;
     }
     let bytes = csv.into_inner().map_err(Failure::internal)?;
-    folder.write("posterior.csv", &String::from_utf8_lossy(&bytes))?;
+    folder.write("posterior.csv", bytes)?;
     let modes = Array2::from_shape_fn((posterior.modes.len(), 1), |(i, _)| {
         posterior.modes[i] as f64
     });
     let matrices = [("draws", &posterior.values), ("mode", &modes)];
     write_matrices(&folder.file("posterior.npz"), &matrices)?;
-    folder.write("posterior.svg", &posterior_svg(study, posterior))
+    Ok(folder.write("posterior.svg", posterior_svg(study, posterior))?)
 }

@@ -1,6 +1,6 @@
 //! Progress on standard error: bars on a terminal, a line now and then in a log.
 
-use super::say::say;
+use super::failure::say;
 use super::stop;
 use crate::progress::{Listener, Progress};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -14,7 +14,6 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Refresh interval; one unit of a stage may take long.
 const LOOK: Duration = Duration::from_millis(250);
-
 /// Interval of the lines in a log: an hour fills two pages.
 const LINES: Duration = Duration::from_secs(30);
 
@@ -30,7 +29,7 @@ pub(super) fn bars() -> Progress {
         open: Mutex::default(),
     });
     let watched = Arc::downgrade(&bars);
-    // Without this thread, bars and lines appear with the next unit.
+    // Without this thread nothing is shown; the work goes on.
     let _ = thread::Builder::new().spawn(move || watch(&watched));
     Progress::new(bars)
 }
@@ -39,7 +38,7 @@ fn watch(bars: &Weak<Bars>) {
     loop {
         thread::sleep(LOOK);
         match bars.upgrade() {
-            Some(bars) => bars.show_what_lasts(),
+            Some(bars) => bars.show(),
             None => return,
         }
     }
@@ -62,19 +61,33 @@ struct Open {
 }
 
 impl Open {
-    /// Shows a bar once the stage has lasted long enough.
-    fn show(&mut self, stage: &str, all: &MultiProgress) {
-        if self.bar.is_some() || self.since.elapsed() < PATIENCE || self.done >= self.total {
+    fn new(total: u64) -> Self {
+        Self {
+            since: Instant::now(),
+            done: 0,
+            total,
+            bar: None,
+            lines: 0,
+        }
+    }
+
+    /// Draws the bar of a stage that has lasted long enough.
+    fn draw(&mut self, stage: &str, all: &MultiProgress) {
+        if self.since.elapsed() < PATIENCE || self.done >= self.total {
             return;
         }
-        // Complete before it is drawn: a bar that changes its template leaves its first picture behind.
-        let bar = ProgressBar::with_draw_target(Some(self.total), ProgressDrawTarget::hidden())
-            .with_elapsed(self.since.elapsed())
-            .with_prefix(stage.to_owned())
-            .with_position(self.done);
-        self.style(&bar);
-        let bar = all.add(bar);
-        bar.enable_steady_tick(LOOK);
+        let template = if self.done == 0 { FIRST } else { LATER };
+        let style = ProgressStyle::with_template(template);
+        let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+        let bar = self.bar.take().unwrap_or_else(|| {
+            // Complete before it is drawn: a bar that changes its template leaves its first picture behind.
+            let bar = ProgressBar::with_draw_target(Some(self.total), ProgressDrawTarget::hidden());
+            let bar = bar.with_elapsed(self.since.elapsed());
+            all.add(bar.with_prefix(stage.to_owned()).with_style(style.clone()))
+        });
+        bar.set_style(style);
+        bar.set_position(self.done);
+        bar.tick();
         self.bar = Some(bar);
     }
 
@@ -91,25 +104,19 @@ impl Open {
             elapsed.as_secs()
         ))
     }
-
-    fn style(&self, bar: &ProgressBar) {
-        let template = if self.done == 0 { FIRST } else { LATER };
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-    }
 }
 
 impl Bars {
-    fn show_what_lasts(&self) {
+    fn show(&self) {
         // A poisoned lock means that another thread panicked.
-        if let Ok(mut open) = self.open.lock() {
-            for (stage, entry) in open.iter_mut() {
-                if self.terminal {
-                    entry.show(stage, &self.all);
-                } else if let Some(line) = entry.line(stage) {
-                    say(&line);
-                }
+        let Ok(mut open) = self.open.lock() else {
+            return;
+        };
+        for (stage, entry) in open.iter_mut() {
+            if self.terminal {
+                entry.draw(stage, &self.all);
+            } else if let Some(line) = entry.line(stage) {
+                say(&line);
             }
         }
     }
@@ -132,34 +139,13 @@ impl Listener for Bars {
             return;
         };
         if done == 0 {
-            let entry = Open {
-                since: Instant::now(),
-                done,
-                total,
-                bar: None,
-                lines: 0,
-            };
-            open.insert(stage.into(), entry);
-            return;
-        }
-        let Some(entry) = open.get_mut(stage) else {
-            return;
-        };
-        let first = entry.done == 0;
-        entry.done = done;
-        if self.terminal {
-            entry.show(stage, &self.all);
-        }
-        if let Some(bar) = &entry.bar {
-            if first {
-                entry.style(bar);
+            open.insert(stage.into(), Open::new(total));
+        } else if done >= total {
+            if let Some(Open { bar: Some(bar), .. }) = open.remove(stage) {
+                bar.finish_and_clear();
             }
-            bar.set_position(done);
-        }
-        if done >= total
-            && let Some(Open { bar: Some(bar), .. }) = open.remove(stage)
-        {
-            bar.finish_and_clear();
+        } else if let Some(entry) = open.get_mut(stage) {
+            entry.done = done;
         }
     }
 }
@@ -171,13 +157,8 @@ mod tests {
     /// A log gets a line each half minute, and not one for each missed.
     #[test]
     fn lines_come_now_and_then() {
-        let mut open = Open {
-            since: Instant::now(),
-            done: 2,
-            total: 5,
-            bar: None,
-            lines: 0,
-        };
+        let mut open = Open::new(5);
+        open.done = 2;
         assert_eq!(open.line("explain"), None);
         let Some(earlier) = open.since.checked_sub(Duration::from_secs(95)) else {
             return;

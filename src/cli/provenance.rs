@@ -2,7 +2,6 @@
 
 use super::context::Context;
 use super::failure::Failure;
-use super::options::Subject;
 use super::output;
 use crate::report::Document;
 use crate::storage::files::sha256_of;
@@ -51,8 +50,8 @@ struct File {
 }
 
 impl Provenance {
-    /// The provenance of a call about `subject`; files are added.
-    pub fn new(context: &Context<'_>, subject: Option<&Subject>) -> Self {
+    /// The provenance of a call and its study file; other files are added.
+    pub fn new(context: &Context<'_>) -> Self {
         let epoch = std::env::var("SOURCE_DATE_EPOCH").ok();
         let provenance = Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -64,7 +63,7 @@ impl Provenance {
                 Some(date.to_string())
             }),
         };
-        provenance.files("study", subject.and_then(|subject| subject.study.as_ref()))
+        provenance.files("study", &context.study_file)
     }
 
     /// Adds files of one role.

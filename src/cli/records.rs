@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::output;
-use crate::record::{Record, RecordReader};
+use crate::record::{Record, RecordReader, column_names};
 use std::path::{Path, PathBuf};
 
 /// A value is an outlier if it exceeds this multiple of nearly all magnitudes of its channel.
@@ -16,44 +16,29 @@ pub(super) fn read(
     paths: &[PathBuf],
     validation: Option<&Path>,
 ) -> Result<(Vec<Record>, Option<Record>), Failure> {
-    let records: Vec<Record> = (paths.iter())
-        .map(|path| reader.record(path))
-        .collect::<Result<_, _>>()?;
-    let second = (validation.map(|path| reader.record(path))).transpose()?;
-    let measured = || paths.iter().map(PathBuf::as_path).zip(&records);
-    for (j, (path, record)) in measured().enumerate() {
-        warn_of_outlier(path, record);
-        if let Some((first, _)) = measured().take(j).find(|(_, other)| *other == record) {
-            warn(&format!(
-                "{} and {} hold the same record, which now counts twice; give each once",
-                first.display(),
-                path.display()
-            ));
+    let mut records = Vec::new();
+    for path in paths.iter().map(PathBuf::as_path).chain(validation) {
+        let record = reader.record(path)?;
+        warn_of_outlier(path, &record);
+        if let Some(same) = records.iter().position(|other| *other == record) {
+            let (first, path) = (paths[same].display(), path.display());
+            warn(&match records.len() < paths.len() {
+                true => format!(
+                    "{first} and {path} hold the same record, which now counts twice; give each once"
+                ),
+                false => format!(
+                    "{path} and {first} hold the same record; a validation record must be a second measurement"
+                ),
+            });
         }
+        records.push(record);
     }
-    if let Some((path, record)) = validation.zip(second.as_ref()) {
-        warn_of_outlier(path, record);
-        if let Some((first, _)) = measured().find(|(_, other)| *other == record) {
-            warn(&format!(
-                "{} and {} hold the same record; a validation record must be a second measurement",
-                path.display(),
-                first.display()
-            ));
-        }
-    }
-    Ok((records, second))
+    let validation = validation.and_then(|_| records.pop());
+    Ok((records, validation))
 }
 
 fn warn(text: &str) {
     output::say(&format!("warning: {text}"));
-}
-
-/// Name of the column of channel `j` of `count`.
-fn column(letter: &str, count: usize, j: usize) -> String {
-    match count {
-        1 => letter.into(),
-        _ => format!("{letter}{}", j + 1),
-    }
 }
 
 /// Warns of the largest value of a record if it is far beyond the others of its channel.
@@ -74,7 +59,7 @@ fn warn_of_outlier(path: &Path, record: &Record) {
                 "{}, row {}, column {}: {:?} is an outlier, 95 % of the column lie within ±{usual:?}; correct it if it is a mistake",
                 path.display(),
                 sample.unwrap_or_default() + 2,
-                column(letter, signal.ncols(), j),
+                column_names(letter, signal.ncols())[j],
                 sample.map_or(largest, |k| channel[k]),
             ));
         }

@@ -10,16 +10,20 @@ use crate::record::RecordError;
 use crate::setting::number;
 use crate::storage::StorageError;
 use crate::study::StudyError;
+use crate::twin::conformance::{Finding, Severity};
 use crate::twin::{SimulationError, TwinError};
 
 /// Where an error comes from.
+#[derive(Debug, Clone, Copy)]
 pub(super) enum Cause {
     /// The call or one of its files.
     Call,
     /// As [`Call`](Self::Call), most likely the study file.
     Study,
-    /// The program itself, or a stop.
+    /// The program itself.
     Internal,
+    /// The user, who has stopped the call.
+    Stop,
 }
 
 /// An error as the command line reports it.
@@ -35,6 +39,25 @@ pub(super) trait Remedy {
 }
 
 impl Remedy for SimulationError {}
+
+/// Remedies of findings about a record.
+impl Remedy for Finding {
+    fn remedy(&self) -> Option<String> {
+        let remedy = match (self.check, self.severity) {
+            ("gaps", _) => "`truetwin resample R.csv --step S --out R2.csv` closes short ones",
+            (_, Severity::Pass) => return None,
+            ("step", _) => {
+                "`truetwin resample R.csv --step S --out R2.csv`; [record] step of the study file; --step-of-record takes the record's, in `estimate` if the features are scores"
+            }
+            ("swapped", _) => "--columns NAME=COLUMN,..",
+            ("inputs", _) => "[record] input of the study file",
+            ("scale", _) if self.message.contains("prior") => "[prior] of the study file",
+            ("parameters", _) if self.message.contains("fix them") => "[fixed] of the study file",
+            _ => return None,
+        };
+        Some(remedy.into())
+    }
+}
 
 impl Remedy for FeatureError {
     fn cause(&self) -> Cause {
@@ -75,12 +98,12 @@ impl Remedy for RecordError {
 impl Remedy for StorageError {
     fn remedy(&self) -> Option<String> {
         Some(match self {
-            Self::Taken { .. } | Self::OtherCall { .. } | Self::Busy { .. } => {
+            Self::Taken { .. } | Self::OtherCall { .. } | Self::Busy(_) => {
                 "choose another --out".into()
             }
             Self::Foreign { verb, .. } => format!("`truetwin {verb}` makes them"),
             Self::Threads { .. } => "--threads N takes fewer".into(),
-            Self::NoMpi { .. } => {
+            Self::NoMpi(_) => {
                 "`cargo install --features mpi`, or --shard i/n in a job array".into()
             }
             _ => return None,

@@ -1,12 +1,10 @@
 //! Ctrl-C stops the work at its next step and prints how to resume; a second one ends the process at once.
 
 use super::context::Verb;
-use super::failure::Failure;
+use super::failure::{Failure, STOPPED};
+use super::remedy::Cause;
 use std::ffi::OsString;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Exit code of a process stopped by Ctrl-C.
-pub(super) const CODE: u8 = 130;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
@@ -14,7 +12,7 @@ static ASKED: AtomicBool = AtomicBool::new(false);
 pub(super) fn listen() {
     let asked = || {
         if ASKED.swap(true, Ordering::Relaxed) {
-            std::process::exit(CODE.into());
+            std::process::exit(STOPPED.into());
         }
     };
     // An application around this command line keeps its own handler.
@@ -42,13 +40,11 @@ pub(super) fn asked() -> bool {
 /// Creates the failure of a stopped call; `call` holds its words.
 pub(super) fn failure(verb: &dyn Verb, call: &[OsString]) -> Failure {
     let words: Vec<_> = call.iter().map(|word| word.to_string_lossy()).collect();
-    let text = if verb.is_resumed() {
-        format!(
-            "stopped; finished work is kept; resume with: {}",
-            shell_words::join(&words)
-        )
-    } else {
-        "stopped; nothing was written".into()
+    let text = match verb.is_resumed() {
+        true => {
+            "stopped; finished work is kept; resume with: ".to_owned() + &shell_words::join(&words)
+        }
+        false => "stopped; nothing was written".into(),
     };
-    Failure::stopped(text, CODE)
+    Failure::new(text, Cause::Stop)
 }

@@ -16,11 +16,8 @@ pub enum StorageError {
         error: io::Error,
     },
     /// An output in a folder that does not exist.
-    #[error("{}: the folder {} does not exist; make it first", path.display(), folder(path).display())]
-    NoParent {
-        /// Output.
-        path: PathBuf,
-    },
+    #[error("{}: the folder {} does not exist; make it first", .0.display(), folder(.0).display())]
+    NoParent(PathBuf),
     /// An output path that holds something else.
     #[error(
         "{} exists already and is no {verb} folder ({reason}); choose another folder or remove it",
@@ -61,12 +58,9 @@ pub enum StorageError {
     /// An output that another process is writing.
     #[error(
         "another run is writing to {}; wait until it is done or stop it, or choose another place",
-        path.display()
+        .0.display()
     )]
-    Busy {
-        /// Output.
-        path: PathBuf,
-    },
+    Busy(PathBuf),
     /// A damaged piece of a work folder.
     #[error("{}: cannot be used ({reason}); remove it, and the next run makes it again", path.display())]
     Piece {
@@ -90,12 +84,9 @@ pub enum StorageError {
     },
     /// Several ranks of a build without MPI: each would do all of the work.
     #[error(
-        "started as {ranks} ranks, but this build has no MPI; build it with the feature mpi, or divide the work into shares"
+        "started as {0} ranks, but this build has no MPI; build it with the feature mpi, or divide the work into shares"
     )]
-    NoMpi {
-        /// Number of ranks.
-        ranks: usize,
-    },
+    NoMpi(usize),
     /// An MPI library that does not start.
     #[error(
         "MPI does not start; check the launcher and the library that this build is linked with"

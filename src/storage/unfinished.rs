@@ -124,28 +124,23 @@ pub(crate) struct NewFolder {
 
 impl NewFolder {
     /// Creates a folder for `place`. Several processes may do so at once; the first to finish wins.
-    pub fn new(place: &Path) -> io::Result<Self> {
-        sweep(folder(place));
-        loop {
-            let filling = Builder::new().prefix(PREFIX).tempdir_in(folder(place));
-            if let Some(new) = Self::locked(place, filling.map_err(without_path)?) {
-                return Ok(new);
-            }
-        }
+    pub fn new(place: &Path) -> Result<Self, StorageError> {
+        Self::made(place, Builder::new().prefix(PREFIX))
     }
 
     /// Creates the folder for `place` that one process at a time may have.
     pub fn claim(place: &Path) -> Result<Self, StorageError> {
+        let path = named(place);
+        let name = path.file_name().unwrap_or_default();
+        Self::made(place, Builder::new().prefix(name).rand_bytes(0))
+    }
+
+    fn made(place: &Path, name: &Builder<'_, '_>) -> Result<Self, StorageError> {
         loop {
-            sweep(folder(place));
-            let path = named(place);
-            let name = path.file_name().unwrap_or_default();
-            let filling = Builder::new()
-                .prefix(name)
-                .rand_bytes(0)
-                .tempdir_in(folder(place));
+            sweep_beside(place);
+            let filling = name.tempdir_in(folder(place));
             let filling = filling.map_err(|error| match error.kind() {
-                io::ErrorKind::AlreadyExists => StorageError::Busy { path: place.into() },
+                io::ErrorKind::AlreadyExists => StorageError::Busy(place.into()),
                 _ => StorageError::io(place, without_path(error)),
             })?;
             if let Some(new) = Self::locked(place, filling) {
@@ -177,16 +172,23 @@ impl NewFolder {
         self.filling.path().join(name)
     }
 
+    /// Adds a file.
+    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
+        fs::write(self.file(name), bytes)
+            .map_err(|error| StorageError::io(&self.place.join(name), error))
+    }
+
     /// Moves the folder to its place.
-    pub fn finish(self) -> io::Result<()> {
+    pub fn finish(self) -> Result<(), StorageError> {
+        let failed = |error| StorageError::io(&self.place, error);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             // A temporary folder is private; a result is like any other folder.
             let mode = fs::Permissions::from_mode(0o755);
-            fs::set_permissions(self.filling.path(), mode)?;
+            fs::set_permissions(self.filling.path(), mode).map_err(failed)?;
         }
-        fs::rename(self.filling.path(), &self.place)?;
+        fs::rename(self.filling.path(), &self.place).map_err(failed)?;
         // Moved away: nothing is left to remove.
         let _ = self.filling.keep();
         Ok(())
@@ -237,7 +239,7 @@ mod tests {
         let path = place.path().join("out");
         let first = NewFolder::claim(&path).unwrap();
         let error = NewFolder::claim(&path).unwrap_err();
-        assert!(matches!(error, StorageError::Busy { .. }), "{error}");
+        assert!(matches!(error, StorageError::Busy(_)), "{error}");
         drop(first);
         NewFolder::claim(&path).unwrap();
     }

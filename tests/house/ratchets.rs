@@ -278,11 +278,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 153, items.collect()),
         Ratchet::new("error types", 13, errors),
-        Ratchet::new("lines of code", 50_000, lines),
-        Ratchet::new("files", 453, files.collect()),
+        Ratchet::new("lines of code", 49_490, lines),
+        Ratchet::new("files", 450, files.collect()),
         Ratchet::new("hidden items", 3, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 427, constants(sources)),
+        Ratchet::new("named numeric constants", 424, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             7,
@@ -293,10 +293,10 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
             2,
             long_functions(sources, 100),
         ),
-        Ratchet::new("further types of one name", 46, repeated_types(sources)),
+        Ratchet::new("further types of one name", 44, repeated_types(sources)),
         Ratchet::new(
             "library messages with words of the command line",
-            10,
+            1,
             foreign_words(sources),
         ),
         Ratchet::new("folders with more than 18 files", 0, crowded(sources, 18)),

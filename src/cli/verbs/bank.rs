@@ -33,10 +33,6 @@ pub(in crate::cli) struct Bank {
 }
 
 impl Verb for Bank {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn is_shared_out(&self) -> bool {
         true
     }
@@ -51,10 +47,9 @@ impl Verb for Bank {
         };
         let share = context.share(self.shard)?;
         // Rows of all ranks are counted, by one rank.
-        let before = if context.ranks.is_root() {
-            plan.finish(&self.out).map_or(0, |filled| filled.rows)
-        } else {
-            0
+        let before = match context.ranks.is_root() {
+            true => plan.finish(&self.out).map_or(0, |filled| filled.rows),
+            false => 0,
         };
         context.ranks.wait();
         let clock = Instant::now();
@@ -69,21 +64,15 @@ impl Verb for Bank {
         let rate = made as f64 / seconds;
         let folder = self.out.display();
         let json = json!({
-                "schema": "truetwin.bank/1",
-                "twin": project.study().name(),
-                "folder": self.out,
-                "size": self.size,
-                "seed": context.seed,
-                "shards": { "there": filled.there, "of": filled.of },
-                "simulated": made,
-                "simulations_per_second": rate,
-                "seconds": seconds,
+            "schema": "truetwin.bank/1", "twin": project.study().name(), "folder": self.out,
+            "size": self.size, "seed": context.seed,
+            "shards": { "there": filled.there, "of": filled.of },
+            "simulated": made, "simulations_per_second": rate, "seconds": seconds,
         });
-        Provenance::new(context, Some(&self.subject)).print_beside(context, json, || {
-            let next = if filled.there == filled.of {
-                format!("next: truetwin pretrain … --bank {folder} --out EST")
-            } else {
-                "other jobs make the other shards; merge their folders with truetwin merge".into()
+        Provenance::new(context).print_beside(context, json, || {
+            let next = match filled.there == filled.of {
+                true => format!("next: truetwin pretrain … --bank {folder} --out EST"),
+                false => "other jobs make the other shards; merge their folders with truetwin merge".into(),
             };
             format!(
                 "{folder}: {} of {} shards, {} of {} simulations; {made} new in {seconds:.1} s ({rate:.0} per second)\n{next}",

@@ -1,9 +1,10 @@
 //! `check`: tests a twin before training, or a record before a fit.
 
 use crate::cli::prelude::*;
+use crate::cli::remedy::Remedy;
 use crate::estimator::PresetName;
 use crate::report::check_document;
-use crate::twin::conformance::{Severity, check, check_step};
+use crate::twin::conformance::{Finding, Severity, check, check_step};
 use crate::twin::{Noise, SimulationError, Twin};
 use std::sync::Arc;
 
@@ -26,16 +27,13 @@ pub(in crate::cli) struct Check {
 }
 
 impl Verb for Check {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let project = context.project(&self.subject)?;
         let study = project.study();
         if let Some(path) = &self.record {
             return self.check_record(context, study, path);
         }
+        let passes = |findings: &[Finding]| findings.iter().all(|f| f.severity < Severity::Failure);
         let drive = study
             .drives()?
             .draw(Noise::new(context.seed, "check input", 0))?;
@@ -44,23 +42,21 @@ impl Verb for Check {
         let twin = (study.twin())
             .watched(move || (counter.tick()).map_err(|stop| SimulationError::Fatal(stop.into())));
         let mut findings = check(&twin, &drive, context.seed);
-        if findings.iter().all(|f| f.severity < Severity::Failure) {
+        if passes(&findings) {
             findings.extend(check_step(&twin, &twin.parameters().centre(), &drive));
         }
         stage.finish();
         context.progress.checkpoint().map_err(Failure::internal)?;
-        if findings.iter().all(|f| f.severity < Severity::Failure) {
+        if passes(&findings) {
             findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
         }
-        let failed = findings.iter().any(|f| f.severity == Severity::Failure);
+        let passed = passes(&findings);
         let json = json!({
-            "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
+            "schema": "truetwin.check/1", "twin": study.name(), "passed": passed, "findings": findings,
         });
-        let provenance = Provenance::new(context, Some(&self.subject));
-        let done = provenance.print_beside(context, json, || {
-            check_document(study.name(), &findings).text()
-        })?;
-        Ok(if failed { ExitCode::FAILURE } else { done })
+        let text = || check_document(study.name(), &findings).text();
+        let done = Provenance::new(context).print_beside(context, json, text)?;
+        Ok(if passed { done } else { ExitCode::FAILURE })
     }
 }
 
@@ -73,15 +69,18 @@ impl Check {
         path: &Path,
     ) -> Result<ExitCode, Failure> {
         let record = self.columns.reader_of_any(study).record(path)?;
-        let result = study.suitability(&record, context.seed, context.progress)?;
+        let mut result = study.suitability(&record, context.seed, context.progress)?;
+        for finding in &mut result.findings {
+            if let Some(remedy) = finding.remedy() {
+                finding.message += &format!(" ({remedy})");
+            }
+        }
         let json = json!({
             "schema": "truetwin.suitability/1", "twin": study.name(), "record": path, "suits": result.suits(),
             "findings": result.findings, "parameters": result.parameters,
         });
-        let provenance = Provenance::new(context, Some(&self.subject)).files("record", [path]);
-        provenance.print_beside(context, json, || {
-            check_document(study.name(), &result.findings).text()
-        })
+        let text = || check_document(study.name(), &result.findings).text();
+        (Provenance::new(context).files("record", [path])).print_beside(context, json, text)
     }
 }
 

@@ -31,15 +31,11 @@ pub(in crate::cli) struct Compare {
 
 impl Verb for Compare {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = NewFolder::asked(&self.out)?;
+        let folder = output::asked_folder(&self.out)?;
         let mut compared = vec![];
         let mut shown = None;
         for path in &self.studies {
-            let subject = Subject {
-                twin: None,
-                study: Some(path.clone()),
-            };
-            let study = context.study(&subject)?;
+            let study = context.configured(path)?.study().clone();
             let reader = self.columns.reader(&study);
             let (mut measured, validation) =
                 records::read(reader, &self.records, Some(&self.validation))?;
@@ -54,15 +50,11 @@ impl Verb for Compare {
                 seed: context.seed,
                 ..FitSettings::default()
             };
-            let at = |failure: Failure| failure.within(path);
-            let fit = (study.fit_with(&measured, &settings, context.progress))
-                .map_err(|error| at(error.into()))?;
-            let score = study
-                .score(&fit, &validation)
-                .map_err(|error| at(error.into()))?;
-            let name = path
-                .file_stem()
-                .map_or_else(String::new, |n| n.to_string_lossy().into());
+            let fit = study.fit_with(&measured, &settings, context.progress);
+            let fit = fit.in_file(path)?;
+            let score = study.score(&fit, &validation).in_file(path)?;
+            let name = path.file_stem().unwrap_or_default();
+            let name = name.to_string_lossy().into();
             compared.push(Compared {
                 name,
                 study,
@@ -71,14 +63,14 @@ impl Verb for Compare {
             });
             shown = Some(validation);
         }
-        let provenance = Provenance::new(context, None)
+        let provenance = Provenance::new(context)
             .files("validation", [&self.validation])
             .files("study", &self.studies)
             .files("record", &self.records);
         let json = provenance.on(compare_json(&compared));
         if let (Some(folder), Some(record)) = (folder, &shown) {
-            folder.write_json("compare.json", &json)?;
-            folder.write("overlay.svg", &compare_svg(&compared, record))?;
+            folder.write("compare.json", format!("{json:#}"))?;
+            folder.write("overlay.svg", compare_svg(&compared, record))?;
             folder.finish()?;
         }
         let what = match self.records.is_empty() {

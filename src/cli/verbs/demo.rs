@@ -26,7 +26,7 @@ pub(in crate::cli) struct Demo {
 
 impl Verb for Demo {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = NewFolder::asked(&self.out)?;
+        let folder = output::asked_folder(&self.out)?;
         let project = match &self.twin {
             Some(name) => context.named(name)?,
             None => (context.projects.iter().find(|p| p.study().demo().is_some()))
@@ -60,13 +60,13 @@ impl Verb for Demo {
             ..EstimateOptions::default()
         };
         let estimate = estimator.estimate_with(&record, &settings, context.progress)?;
-        let provenance = Provenance::new(context, None);
+        let provenance = Provenance::new(context);
         let answer = Answer {
             study,
             record: &record,
             estimate: &estimate,
         };
-        if let (Some(folder), Some(out)) = (folder, &self.out) {
+        if let Some((folder, out)) = folder.zip(self.out.as_ref()) {
             record.write(&folder.file("record.csv"))?;
             answer.write(&folder, &provenance)?;
             folder.finish()?;

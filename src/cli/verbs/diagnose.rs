@@ -1,14 +1,14 @@
 //! `diagnose`: tests whether the twin explains the record, and finds what it lacks.
 
+use crate::cli::failure::STOPPED;
 use crate::cli::prelude::*;
-use crate::cli::stop;
 use crate::diagnose::{DiagnoseSettings, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
-use crate::math::six_digits;
 use crate::record::{Record, drive_csv_text};
 use crate::report::{NEXT_INPUT, Report};
 use crate::setting::number;
+use crate::study::StudyError;
 
 /// Diagnose what the twin lacks: can parameters explain the record; if not, where, which effect, how much of the gap closes.
 ///
@@ -51,12 +51,8 @@ pub(in crate::cli) struct Diagnose {
 }
 
 impl Verb for Diagnose {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = NewFolder::asked(&self.out)?;
+        let folder = output::asked_folder(&self.out)?;
         let study = context.study(&self.subject)?;
         let reader = self.columns.reader(&study);
         let (records, validation) =
@@ -84,27 +80,25 @@ impl Verb for Diagnose {
         .map_err(|error| {
             let path = error.culprit(&self.records, self.validation.as_ref());
             let failure = Failure::diagnosis(error);
-            match path {
-                Some(path) => failure.within(path),
-                None => failure,
-            }
+            path.into_iter()
+                .fold(failure, |failure, path| failure.within(path))
         })?;
-        let provenance = Provenance::new(context, Some(&self.subject))
+        let provenance = Provenance::new(context)
             .files("record", &self.records)
             .files("validation", &self.validation)
             .files("estimator", &self.estimator);
         let json = provenance.on(found.json(&study));
         if let Some(folder) = folder {
-            folder.write_json("report.json", &json)?;
-            folder.write("report.html", &provenance.page(found.document(&study)))?;
+            folder.write("report.json", format!("{json:#}"))?;
+            folder.write("report.html", provenance.page(found.document(&study)))?;
             if let Some(next) = &found.cause.next_input {
-                folder.write(NEXT_INPUT, &drive_csv_text(&next.drive))?;
+                folder.write(NEXT_INPUT, drive_csv_text(&next.drive))?;
             }
             folder.finish()?;
         }
         let done = provenance.print(context, &json, || found.text(&study))?;
         Ok(match found.interrupted {
-            true => ExitCode::from(stop::CODE),
+            true => ExitCode::from(STOPPED),
             false => done,
         })
     }
@@ -114,21 +108,22 @@ impl Diagnose {
     /// Checks that the first record has the study's step, as all others then must: equations that hold for one step may lack something with
     /// another.
     fn check_step(&self, study: &Study, record: &Record) -> Result<(), Failure> {
-        let other_twin = record.check_channels(&study.twin().signals()).is_err();
-        let Some(plan) = study.plan().filter(|_| !other_twin) else {
+        let Some(plan) = study.plan() else {
             return Ok(());
         };
-        let Err(refused) = plan.check_step(record) else {
-            return Ok(());
-        };
-        if self.step_of_record {
-            let (given, expected) = (number(six_digits(record.drive().dt())), number(plan.step));
-            output::say(&format!(
-                "the twin steps {given} s, as the record does, in place of the study's {expected} s; its process noise is scaled to that"
-            ));
-            return Ok(());
+        match plan.check_step(record) {
+            Err(StudyError::OtherStep { given, expected }) if self.step_of_record => {
+                output::say(&format!(
+                    "the twin steps {} s, as the record does, in place of the study's {} s; its process noise is scaled to that",
+                    number(given),
+                    number(expected)
+                ));
+                Ok(())
+            }
+            checked => checked
+                .map_err(Failure::diagnosis)
+                .in_file(&self.records[0]),
         }
-        Err(Failure::diagnosis(refused).within(&self.records[0]))
     }
 }
 
@@ -140,21 +135,15 @@ fn first_estimate(
     record: &Record,
 ) -> Result<Vec<f64>, Failure> {
     let estimator = Estimator::load(path, context.projects)?;
-    let names = |study: &Study| -> Vec<String> {
-        let space = study.twin().parameters();
-        space.names().into_iter().map(Into::into).collect()
-    };
+    let names = |study: &Study| study.twin().parameters().names().join(", ");
     let (theirs, ours) = (names(estimator.study()), names(study));
     if theirs != ours {
         return Err(Failure::user(format!(
-            "{}: the estimator has parameters {}, the study has {}; pretrain one for this twin and study",
+            "{}: the estimator has parameters {theirs}, the study has {ours}; pretrain one for this twin and study",
             path.display(),
-            theirs.join(", "),
-            ours.join(", ")
         )));
     }
-    let checked = estimator.study().check_record(record);
-    checked.map_err(Failure::from)?;
+    estimator.study().check_record(record)?;
     let features = estimator.observe(record)?;
     Ok(estimator.predict_one(&features)?)
 }

@@ -1,6 +1,7 @@
 //! `effects`: lists the effects that a twin may lack.
 
 use crate::cli::prelude::*;
+use crate::effect::{Effect, EffectKind, Magnitude};
 
 /// List the effects that a twin may lack, with targets and magnitudes.
 #[derive(Debug, Args)]
@@ -13,67 +14,53 @@ pub(in crate::cli) struct Effects {
 }
 
 impl Verb for Effects {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let study = context.study(&self.subject)?;
         let possible = study.candidates();
-        let described: Vec<_> = (study.catalogue().kinds().iter())
-            .filter_map(|kind| {
-                let places: Vec<String> = (possible.iter())
-                    .filter(|e| e.id() == kind.id())
-                    .map(|e| match e.other() {
-                        Some(other) => format!(
-                            "{} ({} {other})",
-                            e.target(),
-                            kind.other_state().map_or("with", |other| other.key())
-                        ),
-                        None => e.target().to_owned(),
-                    })
-                    .collect();
-                (!places.is_empty()).then_some((kind, places))
-            })
+        let places = |kind: &EffectKind| -> Vec<String> {
+            let key = kind.other_state().map_or("with", |other| other.key());
+            let effects = possible.iter().filter(|effect| effect.id() == kind.id());
+            let place = |effect: &Effect| match effect.other() {
+                Some(other) => format!("{} ({key} {other})", effect.target()),
+                None => effect.target().to_owned(),
+            };
+            effects.map(place).collect()
+        };
+        let kinds: Vec<(&EffectKind, Vec<String>)> = (study.catalogue().kinds().iter())
+            .map(|kind| (&**kind, places(kind)))
+            .filter(|(_, places)| !places.is_empty())
             .collect();
-        let effects: Vec<Value> = (described.iter())
-                .map(|(d, places)| {
-                    let magnitudes: Vec<Value> = (d.magnitudes().iter())
-                        .map(|m| {
-                            json!({
-                                "name": m.name, "unit": m.unit, "shape": m.off.is_none(),
-                                "off": m.off.filter(|v| v.is_finite()),
-                                "low": Some(m.limits.low()).filter(|v| v.is_finite()),
-                                "high": Some(m.limits.high()).filter(|v| v.is_finite()),
-                            })
-                        })
-                        .collect();
-                    json!({ "id": d.id(), "targets": places, "law": d.formula(), "magnitudes": magnitudes })
-                })
-                .collect();
+        let finite = |value: f64| Some(value).filter(|v| v.is_finite());
+        let magnitude = |m: &Magnitude| {
+            json!({
+                "name": m.name, "unit": m.unit, "shape": m.off.is_none(), "off": m.off.and_then(finite),
+                "low": finite(m.limits.low()), "high": finite(m.limits.high()),
+            })
+        };
+        let effect = |(kind, places): &(&EffectKind, Vec<String>)| {
+            let magnitudes: Vec<Value> = kind.magnitudes().iter().map(magnitude).collect();
+            json!({ "id": kind.id(), "targets": places, "law": kind.formula(), "magnitudes": magnitudes })
+        };
         let json = json!({
-            "schema": "truetwin.effects/1", "twin": study.name(), "effects": effects,
+            "schema": "truetwin.effects/1", "twin": study.name(),
+            "effects": kinds.iter().map(effect).collect::<Vec<_>>(),
         });
+        let lines = |(kind, places): &(&EffectKind, Vec<String>)| {
+            let magnitudes = kind.magnitudes().iter().map(|m| match m.unit {
+                "" => m.name.to_owned(),
+                unit => format!("{} [{unit}]", m.name),
+            });
+            format!(
+                "{:<22} {}\n{:<22} on {}; magnitudes {}",
+                kind.id(),
+                kind.formula(),
+                "",
+                places.join(", "),
+                magnitudes.collect::<Vec<_>>().join(", ")
+            )
+        };
         context.print(&json, || {
-            let lines: Vec<String> = (described.iter())
-                .map(|(d, places)| {
-                    let magnitudes: Vec<String> = (d.magnitudes().iter())
-                        .map(|m| match m.unit {
-                            "" => m.name.to_owned(),
-                            unit => format!("{} [{unit}]", m.name),
-                        })
-                        .collect();
-                    format!(
-                        "{:<22} {}\n{:<22} on {}; magnitudes {}",
-                        d.id(),
-                        d.formula(),
-                        "",
-                        places.join(", "),
-                        magnitudes.join(", ")
-                    )
-                })
-                .collect();
-            lines.join("\n")
+            kinds.iter().map(lines).collect::<Vec<_>>().join("\n")
         })
     }
 }

@@ -43,12 +43,17 @@ pub(in crate::cli) struct Estimate {
 
 impl Verb for Estimate {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = NewFolder::asked(&self.out)?;
+        let folder = output::asked_folder(&self.out)?;
         let estimator = Estimator::load(&self.estimator, context.projects)?;
-        context.check_external_is(estimator.study().name(), "--estimator")?;
-        let reader = self.columns.reader(estimator.study());
+        let study = estimator.study();
+        context.check_external_is(study.name(), "--estimator")?;
+        let reader = self.columns.reader(study);
         let (records, validation) =
             records::read(reader, &self.records, self.validation.as_deref())?;
+        if let Some((validation, path)) = validation.as_ref().zip(self.validation.as_ref()) {
+            let checked = estimator.check_record(validation, self.step_of_record);
+            checked.in_file(path)?;
+        }
         let settings = EstimateOptions {
             seed: context.seed,
             preset: self.preset.map(Into::into),
@@ -57,27 +62,20 @@ impl Verb for Estimate {
             validation,
             draws: self.draws.count()?,
         };
-        if let Some((validation, path)) = settings.validation.as_ref().zip(self.validation.as_ref())
-        {
-            let checked = estimator.check_record(validation, self.step_of_record);
-            checked.map_err(|error| Failure::from(error).within(path))?;
-        }
         let provenance = || {
-            Provenance::new(context, None)
+            Provenance::new(context)
                 .files("record", &self.records)
                 .files("estimator", [&self.estimator])
                 .files("validation", &self.validation)
         };
         if let [record] = &records[..] {
-            let estimate = (estimator.estimate_with(record, &settings, context.progress))
-                .map_err(|error| Failure::from(error).within(&self.records[0]))?;
-            let (provenance, estimate) = (provenance(), &estimate);
-            let study = estimator.study();
+            let estimate = estimator.estimate_with(record, &settings, context.progress);
             let answer = Answer {
                 study,
                 record,
-                estimate,
+                estimate: &estimate.in_file(&self.records[0])?,
             };
+            let provenance = provenance();
             if let Some(folder) = folder {
                 answer.write(&folder, &provenance)?;
                 folder.finish()?;
@@ -97,26 +95,24 @@ impl Verb for Estimate {
                 }
                 other => other.into(),
             })?;
-        let names: Vec<String> = (self.records.iter())
-            .map(|path| path.display().to_string())
-            .collect();
-        let (study, provenance) = (estimator.study(), provenance());
+        let names = self.records.iter().map(|path| path.display().to_string());
+        let names: Vec<String> = names.collect();
+        let provenance = provenance();
         let json = provenance.on(together_json(study, &all, &names));
         if let Some(folder) = folder {
-            folder.write_json("estimate.json", &json)?;
-            for (r, (record, estimate)) in records.iter().zip(&all.records).enumerate() {
+            folder.write("estimate.json", format!("{json:#}"))?;
+            for (number, (record, estimate)) in (1..).zip(records.iter().zip(&all.records)) {
                 let answer = Answer {
                     study,
                     record,
                     estimate,
                 };
-                answer.write_pictures(&folder, &provenance, &format!("-{}", r + 1))?;
+                answer.write_pictures(&folder, &provenance, &format!("-{number}"))?;
             }
             folder.finish()?;
         }
-        provenance.print(context, &json, || {
-            together_document(study, &all, &names).text()
-        })
+        let text = || together_document(study, &all, &names).text();
+        provenance.print(context, &json, text)
     }
 }
 
@@ -141,10 +137,10 @@ impl Answer<'_> {
     /// Writes `estimate.json`, `report.html`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
     pub fn write(&self, folder: &NewFolder, provenance: &Provenance) -> Result<(), Failure> {
         let json = provenance.on(self.estimate.json(self.study));
-        folder.write_json("estimate.json", &json)?;
-        if let Some(cloud) = self.estimate.refit().map(|refit| &refit.cloud) {
+        folder.write("estimate.json", format!("{json:#}"))?;
+        if let Some(refit) = self.estimate.refit() {
             let names: Vec<&str> = self.estimate.names.iter().map(String::as_str).collect();
-            file::write(&folder.file("cloud.npz"), cloud, &names)?;
+            file::write(&folder.file("cloud.npz"), &refit.cloud, &names)?;
         }
         if let Some(draws) = &self.estimate.posterior {
             posterior::write(folder, self.study, draws)?;
@@ -165,16 +161,16 @@ impl Answer<'_> {
             estimate,
         } = self;
         let page = provenance.page(estimate.document(study, Some(record)));
-        folder.write(&format!("report{part}.html"), &page)?;
-        let before = (estimate.refit()).and_then(|refit| refit.tracking_initial.as_ref());
-        let before = before.map(|t| &t.outputs);
+        folder.write(&format!("report{part}.html"), page)?;
         // A free run that diverged cannot be drawn; the text reports it.
-        let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
-            return Ok(());
-        };
-        let overlay = overlay_svg(study, record, before, Some(after));
-        folder.write(&format!("overlay{part}.svg"), &overlay)?;
-        let rows = trajectories_csv(record, before, after);
-        folder.write(&format!("trajectories{part}.csv"), &rows)
+        if let Some(after) = &estimate.tracking {
+            let before = (estimate.refit()).and_then(|refit| refit.tracking_initial.as_ref());
+            let before = before.map(|tracking| &tracking.outputs);
+            let overlay = overlay_svg(study, record, before, Some(&after.outputs));
+            folder.write(&format!("overlay{part}.svg"), overlay)?;
+            let rows = trajectories_csv(record, before, &after.outputs);
+            folder.write(&format!("trajectories{part}.csv"), rows)?;
+        }
+        Ok(())
     }
 }

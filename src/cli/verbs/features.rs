@@ -25,10 +25,6 @@ pub(in crate::cli) struct Features {
 }
 
 impl Verb for Features {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         if let Some(out) = &self.out {
             output::check_new(out)?;
@@ -39,13 +35,10 @@ impl Verb for Features {
         let mut all = Vec::new();
         let stage = context.progress.stage("records", self.records.len());
         for path in &self.records {
-            let at = |failure: Failure| failure.within(path);
             let record = self.columns.reader(study).record(path)?;
-            study
-                .check_record(&record)
-                .map_err(|error| at(error.into()))?;
+            study.check_record(&record).in_file(path)?;
             let features = map.extract(record.drive(), record.outputs());
-            all.extend(features.map_err(|error| at(error.into()))?);
+            all.extend(features.in_file(path)?);
             stage.tick().map_err(Failure::internal)?;
         }
         let features = Array2::from_shape_vec((self.records.len(), map.dim()), all)

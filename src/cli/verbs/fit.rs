@@ -26,12 +26,8 @@ pub(in crate::cli) struct Fit {
 }
 
 impl Verb for Fit {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = NewFolder::asked(&self.out)?;
+        let folder = output::asked_folder(&self.out)?;
         let study = context.study(&self.subject)?;
         let (records, _) = records::read(self.columns.reader(&study), &self.records, None)?;
         let settings = FitSettings {
@@ -40,20 +36,21 @@ impl Verb for Fit {
             ..FitSettings::default()
         };
         let fit = study.fit_with(&records, &settings, context.progress)?;
-        let provenance =
-            Provenance::new(context, Some(&self.subject)).files("record", &self.records);
+        let provenance = Provenance::new(context).files("record", &self.records);
         let json = provenance.on(fit.json(&study));
         if let Some(folder) = folder {
-            folder.write_json("fit.json", &json)?;
+            folder.write("fit.json", format!("{json:#}"))?;
             let page = provenance.page(fit.document(&study, &records));
-            folder.write("report.html", &page)?;
+            folder.write("report.html", page)?;
             for (r, (record, run)) in records.iter().zip(&fit.free_runs).enumerate() {
                 let Some(run) = run else { continue };
-                let name = match r {
-                    0 => "overlay.svg".to_owned(),
-                    r => format!("overlay-{}.svg", r + 1),
+                let number = if r == 0 {
+                    String::new()
+                } else {
+                    format!("-{}", r + 1)
                 };
-                folder.write(&name, &overlay_svg(&study, record, None, Some(run)))?;
+                let overlay = overlay_svg(&study, record, None, Some(run));
+                folder.write(&format!("overlay{number}.svg"), overlay)?;
             }
             if let Some(draws) = &fit.posterior {
                 posterior::write(&folder, &study, draws)?;

@@ -25,8 +25,8 @@ const FILES: [&str; 6] = ["csv", "json", "npy", "npz", "parquet", "txt"];
 impl Verb for Merge {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         output::check_new(&self.out)?;
-        let ending = (self.out.extension()).map(|e| e.to_string_lossy().to_lowercase());
-        if ending.is_some_and(|e| FILES.contains(&e.as_str())) && !file::is_named(&self.out) {
+        let ending = self.out.extension().unwrap_or_default().to_string_lossy();
+        if FILES.contains(&&*ending.to_lowercase()) && !file::is_named(&self.out) {
             return Err(Failure::user(format!(
                 "{}: a file of a bank ends with .npz or .csv; name it so, or a folder without such an ending",
                 self.out.display()
@@ -45,6 +45,6 @@ impl Verb for Merge {
             "schema": "truetwin.merge/1", "out": self.out, "what": what, "count": count,
         });
         let text = || format!("{out}: {count} {what}");
-        Provenance::new(context, None).print_beside(context, json, text)
+        Provenance::new(context).print_beside(context, json, text)
     }
 }

@@ -39,10 +39,6 @@ pub(in crate::cli) struct Pretrain {
 }
 
 impl Verb for Pretrain {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn is_resumed(&self) -> bool {
         true
     }
@@ -71,18 +67,11 @@ impl Verb for Pretrain {
         let bank = estimator.settings().bank_size;
         let loss = history.training.last().copied().unwrap_or(f64::NAN);
         let json = json!({
-                "schema": "truetwin.pretrain/1",
-                "twin": study.name(),
-                "estimator": self.out,
-                "preset": estimator.preset(),
-                "bank_size": bank,
-                "features": estimator.network().inputs(),
-                "epochs": history.epochs_run,
-                "loss": if loss.is_finite() { Some(loss) } else { None },
-                "seed": context.seed,
-                "seconds": seconds,
+            "schema": "truetwin.pretrain/1", "twin": study.name(), "estimator": self.out,
+            "preset": estimator.preset(), "bank_size": bank, "features": estimator.network().inputs(),
+            "epochs": history.epochs_run, "loss": loss, "seed": context.seed, "seconds": seconds,
         });
-        Provenance::new(context, Some(&self.subject)).print_beside(context, json, || {
+        Provenance::new(context).print_beside(context, json, || {
             format!(
                 "{}: estimator of {} from {bank} simulations, {} features, {} epochs, loss {loss:.4}, {seconds:.1} s\n\
                  next: truetwin estimate RECORD.csv --estimator {}",

@@ -96,10 +96,6 @@ pub(in crate::cli) struct Reproduce {
 }
 
 impl Verb for Reproduce {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn is_resumed(&self) -> bool {
         self.out.is_some()
     }
@@ -110,12 +106,11 @@ impl Verb for Reproduce {
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let project = context.project(&self.subject)?;
-        let given = match &self.estimator {
-            Some(path) => Some((path, load(context, path, project.study())?)),
-            None => None,
-        };
+        let given = (self.estimator.as_ref())
+            .map(|path| load(context, path, project.study()))
+            .transpose()?;
         // An estimator carries the setting that it was made for.
-        let study = (given.as_ref()).map_or(project.study(), |(_, estimator)| estimator.study());
+        let study = (given.as_ref()).map_or(project.study(), Estimator::study);
         let study = &study.clone();
         let plan = MonteCarlo {
             benchmark: Benchmark::of(study),
@@ -134,27 +129,22 @@ impl Verb for Reproduce {
             return Err(Failure::user("--out is required under mpirun"));
         }
         let share = context.share(self.shard)?;
-        let folder = match &self.out {
-            Some(out) => {
-                let origin = match &given {
-                    Some((path, _)) => Origin::File(path),
-                    None => Origin::Trained(project.recipe(training.preset), &training),
-                };
-                Some(plan.folder(out, study, origin)?)
-            }
-            None => None,
+        let origin = match &self.estimator {
+            Some(path) => Origin::File(path),
+            None => Origin::Trained(project.recipe(training.preset), &training),
         };
+        let folder = (self.out.as_ref())
+            .map(|out| plan.folder(out, study, origin))
+            .transpose()?;
         let estimator = match (given, &folder) {
-            (Some((_, estimator)), _) => estimator,
+            (Some(estimator), _) => estimator,
             (None, None) => pretrain(&project, &training, context.progress)?.0,
             (None, Some(folder)) => kept(context, &project, &training, folder)?,
         };
-        if let (Some(out), Some(folder)) = (&self.out, &folder) {
-            let there = plan
-                .run_share(&estimator, Some(folder), share, context.progress)?
-                .len();
-            if self.shard.is_some() && there < self.runs {
-                return context.print_share(out, "records", there, self.runs);
+        if let Some(folder) = &folder {
+            let runs = plan.run_share(&estimator, Some(folder), share, context.progress)?;
+            if self.shard.is_some() && runs.len() < self.runs {
+                return context.print_share(folder.path(), "records", runs.len(), self.runs);
             }
             context.ranks.wait();
             if !context.ranks.is_root() {
@@ -163,8 +153,7 @@ impl Verb for Reproduce {
         }
         let runs = plan.run_in(&estimator, folder.as_ref(), context.progress)?;
         let scores = score(study, &plan, &runs);
-        let provenance =
-            Provenance::new(context, Some(&self.subject)).files("estimator", &self.estimator);
+        let provenance = Provenance::new(context).files("estimator", &self.estimator);
         let json = provenance.on(reproduce_json(study, &plan, estimator.preset(), &scores));
         let text = reproduce_text(study, &plan, estimator.preset(), &scores);
         if let Some(folder) = &folder {
@@ -206,7 +195,7 @@ fn kept(
     while context.ranks.is_root() && !path.exists() {
         match Pretraining::new(project, *training).write(&path, context.progress) {
             // Another job is training it.
-            Err(EstimatorError::Work(StorageError::Busy { .. })) => {
+            Err(EstimatorError::Work(StorageError::Busy(_))) => {
                 context.progress.checkpoint().map_err(Failure::internal)?;
                 std::thread::sleep(LOOK);
             }

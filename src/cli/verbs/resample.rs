@@ -51,8 +51,7 @@ impl Verb for Resample {
             Inputs::Mean => InputRule::Mean,
             Inputs::Hold => InputRule::Hold,
         };
-        let new = resample(&record, self.step, rule, self.longest_gap)
-            .map_err(|error| Failure::from(error).within(&self.record))?;
+        let new = resample(&record, self.step, rule, self.longest_gap).in_file(&self.record)?;
         new.record.write(&self.out)?;
         let grid = |record: &Record| {
             let (shortest, longest) = steps(record);
@@ -67,7 +66,7 @@ impl Verb for Resample {
             "before": grid(&record), "after": grid(&new.record),
             "interpolated": new.interpolated, "longest_gap": new.longest_gap,
         });
-        Provenance::new(context, None)
+        Provenance::new(context)
             .files("record", [&self.record])
             .print_beside(context, json, || self.text(&record, &new))
     }

@@ -52,7 +52,7 @@ impl Verb for Man {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let pages = pages(context)?;
         if let Some(out) = &self.out {
-            let folder = NewFolder::new(out)?;
+            let folder = output::new_folder(out)?;
             for (name, text) in &pages {
                 folder.write(&format!("{name}.1"), text)?;
             }
@@ -64,17 +64,16 @@ impl Verb for Man {
                 format!("{out}: {} pages\nnext: man {out}/{program}.1", names.len())
             });
         }
-        let asked = match &self.verb {
-            Some(verb) => format!("{}-{verb}", context.program),
-            None => context.program.to_owned(),
+        let verb = self.verb.as_deref().unwrap_or_default();
+        let asked = match verb {
+            "" => context.program.to_owned(),
+            verb => format!("{}-{verb}", context.program),
         };
         let Some((name, text)) = pages.iter().find(|(name, _)| *name == asked) else {
             let verbs = command(context);
-            let verb = self.verb.as_deref().unwrap_or_default();
             let known: Vec<&str> = verbs.get_subcommands().map(Command::get_name).collect();
             return Err(Failure::user(format!(
-                "man: no verb is called {}{}; there are {}",
-                verb,
+                "man: no verb is called {verb}{}; there are {}",
                 did_you_mean(verb, &known),
                 known.join(", ")
             )));
@@ -86,18 +85,13 @@ impl Verb for Man {
 
 /// Returns the command line with this program's name, and its twins as values of `--twin`.
 fn command(context: &Context<'_>) -> Command {
-    let names: Vec<String> = (context.projects.iter())
-        .map(|project| project.study().name().to_owned())
-        .collect();
+    let names = context.projects.iter().map(|p| p.study().name().to_owned());
+    let names: Vec<String> = names.collect();
     ((context.command)().name(context.program.to_owned())).mut_subcommands(|verb| {
-        let takes_twin = verb.get_arguments().any(|option| option.get_id() == "twin");
-        if takes_twin {
-            verb.mut_arg("twin", |option| {
-                option.value_parser(PossibleValuesParser::new(names.clone()))
-            })
-        } else {
-            verb
-        }
+        verb.mut_args(|option| match option.get_id() == "twin" {
+            true => option.value_parser(PossibleValuesParser::new(names.clone())),
+            false => option,
+        })
     })
 }
 
@@ -106,19 +100,19 @@ fn pages(context: &Context<'_>) -> Result<Vec<(String, String)>, Failure> {
     let mut whole = command(context).bin_name(context.program.to_owned());
     // Copies the global options to each verb.
     whole.build();
-    let verbs = (whole
+    let mut pages = vec![(context.program.to_owned(), whole.clone())];
+    for verb in whole
         .get_subcommands()
-        .filter(|verb| verb.get_name() != "help"))
-    .cloned();
-    let named = verbs.map(|verb| (format!("{}-{}", context.program, verb.get_name()), verb));
-    std::iter::once((context.program.to_owned(), whole.clone()))
-        .chain(named)
-        .map(|(name, verb)| {
-            let mut text = Vec::new();
-            (Page::new(verb).title(name.to_uppercase()))
-                .render(&mut text)
-                .map_err(Failure::internal)?;
-            Ok((name, String::from_utf8(text).map_err(Failure::internal)?))
-        })
-        .collect()
+        .filter(|verb| verb.get_name() != "help")
+    {
+        let name = format!("{}-{}", context.program, verb.get_name());
+        pages.push((name, verb.clone()));
+    }
+    let rendered = |(name, verb): (String, Command)| {
+        let mut text = Vec::new();
+        let page = Page::new(verb).title(name.to_uppercase());
+        page.render(&mut text).map_err(Failure::internal)?;
+        Ok((name, String::from_utf8(text).map_err(Failure::internal)?))
+    };
+    pages.into_iter().map(rendered).collect()
 }

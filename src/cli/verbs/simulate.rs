@@ -4,7 +4,7 @@ use crate::cli::prelude::*;
 use crate::effect::{Effect, augment};
 use crate::record::{Drive, Record, record_csv_text};
 use crate::setting::{did_you_mean, number};
-use crate::twin::{Noise, ParameterSpace, Role, Twin};
+use crate::twin::{Noise, Parameter, ParameterSpace, Role, Twin};
 use std::collections::BTreeMap;
 
 /// Simulate a record at given parameters, with noise and optional effects.
@@ -36,10 +36,6 @@ pub(in crate::cli) struct Simulate {
 }
 
 impl Verb for Simulate {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         if let Some(out) = &self.out {
             output::check_new(out)?;
@@ -50,11 +46,8 @@ impl Verb for Simulate {
         let mut magnitudes = BTreeMap::new();
         if let Some(path) = &self.effect {
             let effects = study.catalogue().read(path)?;
-            magnitudes = effects
-                .iter()
-                .flat_map(Effect::given_by_parameter)
-                .collect();
-            twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
+            magnitudes.extend(effects.iter().flat_map(Effect::given_by_parameter));
+            twin = augment(twin, effects).in_file(path)?;
         }
         let theta = complete(&twin.parameters(), &given, &magnitudes)?;
         let noise = Noise::new(context.seed, "simulate", 0);
@@ -62,7 +55,7 @@ impl Verb for Simulate {
             Some(path) => self.columns.reader(&study).drive(path)?,
             None => study.drives()?.draw(noise)?,
         };
-        check_inputs(&twin, &drive, self)?;
+        self.check_inputs(&twin, &drive)?;
         let noise = if self.noise_free { Noise::OFF } else { noise };
         let outputs = twin.simulate(&theta, &drive, noise)?;
         let record = Record::complete(drive, outputs)?;
@@ -71,44 +64,55 @@ impl Verb for Simulate {
         }
         let rows = || record.outputs().rows().into_iter().map(|row| row.to_vec());
         let json = json!({
-            "schema": "truetwin.simulate/1",
-            "twin": study.name(),
-            "names": twin.parameters().names(),
-            "theta": theta,
-            "seed": context.seed,
-            "noise_free": self.noise_free,
-            "samples": record.samples(),
-            "step": record.drive().dt(),
-            "record": self.out,
+            "schema": "truetwin.simulate/1", "twin": study.name(),
+            "names": twin.parameters().names(), "theta": theta,
+            "seed": context.seed, "noise_free": self.noise_free,
+            "samples": record.samples(), "step": record.drive().dt(), "record": self.out,
             "y": self.out.is_none().then(|| rows().collect::<Vec<_>>()),
         });
         let text = || match &self.out {
             Some(_) => String::new(),
             None => record_csv_text(&record),
         };
-        Provenance::new(context, Some(&self.subject))
+        Provenance::new(context)
             .files("input", &self.input)
             .files("effect", &self.effect)
             .print_beside(context, json, text)
     }
 }
 
+impl Simulate {
+    fn check_inputs(&self, twin: &Twin, drive: &Drive) -> Result<(), Failure> {
+        let (given, expected) = (drive.inputs().ncols(), twin.signals().inputs.len());
+        let path = self.input.as_deref().unwrap_or(Path::new("input"));
+        if given == expected {
+            return twin.check_drive(drive).in_file(path);
+        }
+        Err(Failure::user(format!(
+            "{}: {given} inputs, the twin has {expected}; give t and one column for each input",
+            path.display()
+        )))
+    }
+}
+
+/// Creates the failure of a wrong `--theta`.
+fn wrong_theta(problem: String) -> Failure {
+    Failure::user(format!("--theta{problem}"))
+}
+
 /// Parses `a=1,b=2`.
 fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
     let mut values = BTreeMap::new();
     for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
-        let wrong = || {
-            Failure::user(format!(
-                "--theta: \"{part}\" is not name=value; write k=0.5, with commas between"
+        let pair = part.split_once('=');
+        let pair = pair.and_then(|(name, value)| Some((name.trim(), value.trim().parse().ok()?)));
+        let (name, value) = pair.ok_or_else(|| {
+            wrong_theta(format!(
+                ": \"{part}\" is not name=value; write k=0.5, with commas between"
             ))
-        };
-        let (name, value) = part.split_once('=').ok_or_else(wrong)?;
-        let value: f64 = value.trim().parse().map_err(|_| wrong())?;
-        if values.insert(name.trim().to_owned(), value).is_some() {
-            let name = name.trim();
-            return Err(Failure::user(format!(
-                "--theta gives {name} twice; give it once"
-            )));
+        })?;
+        if values.insert(name.to_owned(), value).is_some() {
+            return Err(wrong_theta(format!(" gives {name} twice; give it once")));
         }
     }
     Ok(values)
@@ -121,51 +125,28 @@ fn complete(
     magnitudes: &BTreeMap<String, f64>,
 ) -> Result<Vec<f64>, Failure> {
     let names = space.names();
+    let all = names.join(", ");
     if let Some(name) = given.keys().find(|name| !names.contains(&name.as_str())) {
-        return Err(Failure::user(format!(
-            "--theta: no parameter is called {name}{}; there are {}",
+        return Err(wrong_theta(format!(
+            ": no parameter is called {name}{}; there are {all}",
             did_you_mean(name, &names),
-            names.join(", ")
         )));
     }
-    let mut theta = Vec::new();
-    for p in space.iter() {
-        let value = given.get(&p.name).copied();
-        let value = match (value, magnitudes.get(&p.name), p.role) {
-            (Some(value), _, _) if !p.bounds.contains(value) => {
-                return Err(Failure::user(format!(
-                    "--theta: {} = {} is outside its bounds {}; choose a value inside",
-                    p.name,
-                    number(value),
-                    p.bounds
-                )));
-            }
-            (Some(value), _, _) => value,
-            // The effect has checked its limits; off values may be infinite.
-            (None, Some(magnitude), _) => *magnitude,
-            (None, None, Role::Start | Role::Noise) => p.prior.centre(),
-            (None, None, _) => {
-                return Err(Failure::user(format!(
-                    "--theta: no value for {}; give {}",
-                    p.name,
-                    names.join(", ")
-                )));
-            }
-        };
-        theta.push(value);
-    }
-    Ok(theta)
-}
-
-fn check_inputs(twin: &Twin, drive: &Drive, options: &Simulate) -> Result<(), Failure> {
-    let (given, expected) = (drive.inputs().ncols(), twin.signals().inputs.len());
-    let path = options.input.as_deref().unwrap_or(Path::new("input"));
-    if given == expected {
-        let checked = twin.check_drive(drive);
-        return checked.map_err(|error| Failure::from(error).within(path));
-    }
-    Err(Failure::user(format!(
-        "{}: {given} inputs, the twin has {expected}; give t and one column for each input",
-        path.display()
-    )))
+    let value = |p: &Parameter| match (given.get(&p.name), magnitudes.get(&p.name), p.role) {
+        (Some(value), _, _) if p.bounds.contains(*value) => Ok(*value),
+        (Some(value), _, _) => Err(wrong_theta(format!(
+            ": {} = {} is outside its bounds {}; choose a value inside",
+            p.name,
+            number(*value),
+            p.bounds
+        ))),
+        // The effect has checked its limits; off values may be infinite.
+        (None, Some(magnitude), _) => Ok(*magnitude),
+        (None, None, Role::Start | Role::Noise) => Ok(p.prior.centre()),
+        (None, None, _) => Err(wrong_theta(format!(
+            ": no value for {}; give {all}",
+            p.name
+        ))),
+    };
+    space.iter().map(value).collect()
 }

@@ -40,37 +40,31 @@ fn describe(study: &Study) -> Value {
 fn in_words(study: &Study) -> String {
     let twin = study.twin();
     let signals = twin.signals();
-    let names = |all: &[Quantity]| match all.len() {
-        0 => "none".to_owned(),
-        _ => (all.iter())
-            .map(|q| format!("{} [{}]", q.name, q.unit))
-            .collect::<Vec<_>>()
-            .join(", "),
+    let names = |all: &[Quantity]| match all {
+        [] => "none".to_owned(),
+        _ => {
+            let all = all.iter().map(|q| format!("{} [{}]", q.name, q.unit));
+            all.collect::<Vec<_>>().join(", ")
+        }
     };
-    let states = match twin.outline() {
-        Some(outline) => names(&outline.states),
-        None => "hidden (black box)".into(),
-    };
+    let states = twin.outline().map(|outline| names(&outline.states));
+    let record = study
+        .plan()
+        .map(|p| format!("{} samples, step {} s", p.samples, p.step));
     let mut text = format!(
-        "{}\n  states  {states}\n  inputs  {}\n  outputs {}\n  record  {}\n  {:<12} {:<8} {:<16} bounds\n",
+        "{}\n  states  {}\n  inputs  {}\n  outputs {}\n  record  {}\n  {:<12} {:<8} {:<16} bounds\n",
         study.name(),
+        states.unwrap_or("hidden (black box)".into()),
         names(&signals.inputs),
         names(&signals.outputs),
-        study.plan().map_or("as measured".into(), |plan| {
-            format!("{} samples, step {} s", plan.samples, plan.step)
-        }),
+        record.unwrap_or("as measured".into()),
         "parameter",
         "unit",
         "prior",
     );
     for p in twin.parameters().iter() {
-        text.push_str(&format!(
-            "  {:<12} {:<8} {:<16} {}\n",
-            p.name,
-            p.unit,
-            p.prior.to_string(),
-            p.bounds
-        ));
+        let (prior, bounds) = (p.prior.to_string(), p.bounds);
+        text += &format!("  {:<12} {:<8} {prior:<16} {bounds}\n", p.name, p.unit);
     }
     text
 }

@@ -28,7 +28,7 @@ pub(in crate::cli) struct Withheld {
     #[arg(long, value_name = "KIND,..", value_delimiter = ',', value_parser = kind)]
     kinds: Option<Vec<Kind>>,
     /// Families of random laws: open to choose constants with, closed for reports.
-    #[arg(long, value_name = "HALF", default_value = "all", value_parser = families)]
+    #[arg(long, value_name = "HALF", default_value = "all")]
     families: Families,
     /// Measured record whose inputs, length, step and gaps the trials have [default: the study's plan].
     #[arg(long, value_name = "RECORD.csv")]
@@ -56,24 +56,20 @@ pub(in crate::cli) struct Withheld {
 }
 
 impl Verb for Withheld {
-    fn subject(&self) -> Option<&Subject> {
-        Some(&self.subject)
-    }
-
     fn is_shared_out(&self) -> bool {
         true
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let study = context.study(&self.subject)?;
-        let like = (self.like.as_deref()).map(|path| self.columns.reader(&study).record(path));
-        let like = like.transpose()?;
+        let like = self.like.as_deref();
+        let like = like.map(|path| self.columns.reader(&study).record(path));
         let settings = TrialSettings {
             trials: self.trials,
             seed: context.seed,
             kinds: self.kinds.clone().unwrap_or(Kind::ALL.to_vec()),
             families: self.families,
-            like,
+            like: like.transpose()?,
             without: self.without,
             validation: self.validation,
             detection_only: self.detection_only,
@@ -95,7 +91,7 @@ impl Verb for Withheld {
             return Ok(ExitCode::SUCCESS);
         }
         let card = sealed.score(context.progress)?;
-        let provenance = Provenance::new(context, Some(&self.subject)).files("record", &self.like);
+        let provenance = Provenance::new(context).files("record", &self.like);
         let json = provenance.on(card.json());
         sealed.write("scorecard.html", &provenance.page(card.document()))?;
         // Written last: it marks the folder as complete.
@@ -106,18 +102,12 @@ impl Verb for Withheld {
 
 /// Parses a number of trials. A number that is too large is refused with the limit, however it is written.
 fn number_of_trials(text: &str) -> Result<usize, String> {
-    let is_large = text
-        .parse::<f64>()
-        .is_ok_and(|number| number > trials::MOST as f64);
-    match is_large {
-        true => Err(format!("choose at most {}", trials::MOST)),
-        false => at_least_one(text),
+    match text.parse::<f64>() {
+        Ok(number) if number > trials::MOST as f64 => {
+            Err(format!("choose at most {}", trials::MOST))
+        }
+        _ => at_least_one(text),
     }
-}
-
-/// Parses a half of the families.
-fn families(text: &str) -> Result<Families, String> {
-    text.parse()
 }
 
 /// Parses a part of a diagnosis.

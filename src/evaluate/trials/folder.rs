@@ -3,10 +3,10 @@
 use super::truth::Truth;
 use crate::evaluate::EvaluateError;
 use crate::record::{Record, record_csv_text};
-use crate::storage::StorageError;
 use crate::storage::files::sha256;
 use crate::storage::untrusted::check_file;
-use crate::storage::work::{Manifest, NewWork, WorkFolder};
+use crate::storage::work::{Manifest, WorkFolder};
+use crate::storage::{NewFolder, StorageError};
 use serde::Serialize;
 use std::io;
 use std::path::Path;
@@ -57,7 +57,7 @@ fn record_name(trial: usize, which: Which) -> String {
 }
 
 /// A new folder that is filled with sealed trials.
-pub(super) struct Filling<'a>(&'a NewWork<'a>);
+pub(super) struct Filling<'a>(&'a NewFolder);
 
 impl Filling<'_> {
     /// Adds a record.

@@ -18,7 +18,21 @@ pub(crate) const MOST_NUMBERS: usize = 1 << 29;
 
 /// The bytes of a file, `most` of them; a longer one is refused, also one that has no end.
 pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    whole(File::open(path)?, most)
+    let file = File::open(path)?;
+    // Of a pipe or a device the system knows no length.
+    let length = file.metadata()?.len();
+    let mut bytes = Vec::new();
+    if length <= most {
+        bytes.reserve_exact(length as usize);
+        file.take(most + 1).read_to_end(&mut bytes)?;
+    }
+    match length.max(bytes.len() as u64) > most {
+        true => {
+            let text = format!("longer than {}, the limit of such a file", size(most));
+            Err(io::Error::new(io::ErrorKind::FileTooLarge, text))
+        }
+        false => Ok(bytes),
+    }
 }
 
 /// As [`read`], for text.
@@ -62,26 +76,6 @@ fn not_plain(what: &str) -> io::Error {
 fn text(bytes: Vec<u8>) -> io::Result<String> {
     let wrong = |_| io::Error::new(io::ErrorKind::InvalidData, "it is no UTF-8 text");
     String::from_utf8(bytes).map_err(wrong)
-}
-
-fn whole(file: File, most: u64) -> io::Result<Vec<u8>> {
-    // Of a pipe or a device the system knows no length.
-    let length = file.metadata()?.len();
-    if length > most {
-        return Err(too_large(most));
-    }
-    let mut bytes = Vec::with_capacity(length as usize);
-    file.take(most + 1).read_to_end(&mut bytes)?;
-    match bytes.len() as u64 > most {
-        true => Err(too_large(most)),
-        false => Ok(bytes),
-    }
-}
-
-/// The error of what is longer than its limit, in bytes.
-pub(crate) fn too_large(most: u64) -> io::Error {
-    let text = format!("longer than {}, the limit of such a file", size(most));
-    io::Error::new(io::ErrorKind::FileTooLarge, text)
 }
 
 /// A round number of bytes, for people.

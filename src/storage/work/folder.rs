@@ -1,17 +1,19 @@
 //! A folder that keeps finished pieces of long work.
 
-use super::Manifest;
+use super::manifest::{CHECKSUMS, Manifest};
 use crate::storage::files::{folder, replace, write_new};
 use crate::storage::unfinished;
-use crate::storage::untrusted::{check_folder, message, read_kept_text};
-use crate::storage::{NewFolder, StorageError};
+use crate::storage::untrusted::{check_file, check_folder, message, read_kept_text};
+use crate::storage::{NewFolder, StorageError, sweep_beside};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
 const MANIFEST: &str = "manifest.json";
+const LOCK: &str = "lock";
 /// Longest file of a folder that is read whole, in bytes: the manifest of a bank of 10¹⁰ simulations is a tenth of it.
 const MOST: u64 = 1 << 28;
 
@@ -35,18 +37,23 @@ impl WorkFolder {
         path: &Path,
         manifest: &Manifest,
         parts: &[&str],
-        fill: impl FnOnce(&NewWork<'_>) -> Result<(), E>,
+        fill: impl FnOnce(&NewFolder) -> Result<(), E>,
     ) -> Result<Self, E> {
         if path.symlink_metadata().is_err() {
             if !folder(path).is_dir() {
-                return Err(StorageError::NoParent { path: path.into() }.into());
+                return Err(StorageError::NoParent(path.into()).into());
             }
             let made = || -> Result<(), E> {
-                let new = NewWork::new(path, parts)?;
+                let new = NewFolder::new(path)?;
+                for part in parts {
+                    std::fs::create_dir(new.file(part))
+                        .map_err(|error| StorageError::io(path, error))?;
+                }
                 fill(&new)?;
-                new.write(MANIFEST, manifest.text().as_bytes())?;
+                new.write(MANIFEST, manifest.text())?;
                 Ok(new.finish()?)
             };
+            // Another process may have been faster.
             if let Err(error) = made()
                 && !appears(path)
             {
@@ -103,7 +110,10 @@ impl WorkFolder {
 
     /// Adds the checksums of all pieces to the manifest: the work is finished.
     pub(crate) fn finish(&self, manifest: &Manifest, checksums: Value) -> Result<(), StorageError> {
-        self.write(MANIFEST, &manifest.clone().finished(checksums).text())
+        self.write(
+            MANIFEST,
+            &manifest.clone().with(CHECKSUMS, checksums).text(),
+        )
     }
 
     /// Reads a file of the folder as text.
@@ -162,9 +172,28 @@ impl WorkFolder {
         }
     }
 
+    /// Keeps other processes out until the file is dropped, or its process ends. Numbered pieces need no lock. On a file system
+    /// without locks two processes may do the same work, to the same bits.
+    pub(crate) fn lock(&self) -> Result<File, StorageError> {
+        let path = self.file(LOCK);
+        let failed = |error| StorageError::io(&path, error);
+        if path.symlink_metadata().is_ok() {
+            check_file(&path).map_err(failed)?;
+        }
+        let mut options = OpenOptions::new();
+        let file = (options.create(true).append(true).open(&path)).map_err(failed)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Err(StorageError::Busy(self.path.clone())),
+            Err(TryLockError::Error(error)) if error.kind() != io::ErrorKind::Unsupported => {
+                Err(failed(error))
+            }
+            _ => Ok(file),
+        }
+    }
+
     /// Removes leftovers of killed processes beside the folder, in it and in its parts.
     pub(crate) fn sweep(&self) {
-        unfinished::sweep(folder(&self.path));
+        sweep_beside(&self.path);
         unfinished::sweep(&self.path);
         for entry in self.path.read_dir().into_iter().flatten().flatten() {
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
@@ -174,54 +203,14 @@ impl WorkFolder {
     }
 }
 
-/// A new work folder, to which the call adds files before the folder appears.
-pub(crate) struct NewWork<'a> {
-    filling: NewFolder,
-    place: &'a Path,
-}
-
-impl<'a> NewWork<'a> {
-    /// Creates a folder for `place` with a folder for each of `parts`.
-    pub(super) fn new(place: &'a Path, parts: &[&str]) -> Result<Self, StorageError> {
-        let failed = |error| StorageError::io(place, error);
-        let filling = NewFolder::new(place).map_err(failed)?;
-        for part in parts {
-            std::fs::create_dir(filling.file(part)).map_err(failed)?;
-        }
-        Ok(Self { filling, place })
-    }
-
-    /// Adds a file.
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), StorageError> {
-        std::fs::write(self.filling.file(name), bytes)
-            .map_err(|error| StorageError::io(&self.place.join(name), error))
-    }
-
-    /// Moves the folder to its place, unless another process was faster.
-    pub(super) fn finish(self) -> Result<(), StorageError> {
-        use std::io::ErrorKind::{AlreadyExists, DirectoryNotEmpty};
-        match self.filling.finish() {
-            Err(error) if !matches!(error.kind(), AlreadyExists | DirectoryNotEmpty) => {
-                Err(StorageError::io(self.place, error))
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
 /// Reads the manifest of a folder of `verb`; else the reason why it has none, in words.
 fn read_manifest(path: &Path, verb: &'static str) -> Result<Manifest, String> {
-    if !path.is_dir() {
-        let is_file = path.symlink_metadata().is_ok();
-        return Err(if is_file {
-            "it is no folder"
-        } else {
-            "it does not exist"
-        }
-        .into());
+    match path.symlink_metadata() {
+        _ if path.is_dir() => {}
+        Ok(_) => return Err("it is no folder".into()),
+        Err(_) => return Err("it does not exist".into()),
     }
-    let text = read_kept_text(&path.join(MANIFEST), MOST);
-    let text = text.map_err(|error| match error.kind() {
+    let text = read_kept_text(&path.join(MANIFEST), MOST).map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => "it has no manifest.json".into(),
         _ => format!("its manifest.json: {error}"),
     })?;
@@ -324,5 +313,33 @@ mod tests {
         });
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
         assert_eq!(fs::read_to_string(path.join("start.txt")).unwrap(), "a");
+    }
+
+    #[test]
+    fn the_second_is_kept_out_until_the_first_has_gone() {
+        let place = tempfile::tempdir().unwrap();
+        let manifest = Manifest::new("pretrain", 1);
+        let open = || {
+            let path = place.path().join("work");
+            WorkFolder::open::<StorageError>(&path, &manifest, &[], |_| Ok(())).unwrap()
+        };
+        let first = open().lock().unwrap();
+        let refused = open().lock().unwrap_err();
+        assert!(matches!(refused, StorageError::Busy(_)), "{refused}");
+        drop(first);
+        open().lock().unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_that_leads_elsewhere_is_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let manifest = Manifest::new("pretrain", 1);
+        let path = place.path().join("work");
+        let folder = WorkFolder::open::<StorageError>(&path, &manifest, &[], |_| Ok(())).unwrap();
+        let elsewhere = place.path().join("elsewhere");
+        std::os::unix::fs::symlink(&elsewhere, folder.file("lock")).unwrap();
+        assert!(folder.lock().is_err());
+        assert!(!elsewhere.exists());
     }
 }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use std::path::Path;
 
 /// Entry that a finished folder has in addition.
-const CHECKSUMS: &str = "checksums";
+pub(super) const CHECKSUMS: &str = "checksums";
 /// Longest value that a message shows, in characters.
 const SHORT: usize = 40;
 
@@ -21,11 +21,8 @@ pub struct Manifest {
 impl Manifest {
     /// Creates the manifest of a folder of `verb`; `layout` is raised when the folder's layout changes.
     pub fn new(verb: &'static str, layout: u32) -> Self {
-        let empty = Self {
-            verb,
-            entries: Map::new(),
-        };
-        empty
+        let entries = Map::new();
+        Self { verb, entries }
             .with("schema", format!("truetwin.{verb}-folder/{layout}"))
             .with("version", env!("CARGO_PKG_VERSION"))
     }
@@ -52,11 +49,6 @@ impl Manifest {
         self
     }
 
-    /// Adds the checksums of all pieces.
-    pub(super) fn finished(self, checksums: Value) -> Self {
-        self.with(CHECKSUMS, checksums)
-    }
-
     /// Verb that makes the folder.
     pub fn verb(&self) -> &'static str {
         self.verb
@@ -80,22 +72,15 @@ impl Manifest {
                 excerpt(&error.to_string())
             )
         })?;
-        let schema = entries
-            .get("schema")
-            .and_then(Value::as_str)
-            .unwrap_or_default();
-        if schema.starts_with(&format!("truetwin.{verb}-folder/")) {
-            return Ok(Self { verb, entries });
+        let schema = entries.get("schema").and_then(Value::as_str);
+        let maker = schema
+            .and_then(|schema| schema.strip_prefix("truetwin.")?.split_once("-folder/"))
+            .map(|(maker, _)| maker);
+        match maker {
+            Some(maker) if maker == verb => Ok(Self { verb, entries }),
+            Some(other) => Err(format!("it is a {} folder", excerpt(other))),
+            None => Err("its manifest.json has another schema".into()),
         }
-        Err(
-            match schema
-                .strip_prefix("truetwin.")
-                .and_then(|s| s.split_once("-folder/"))
-            {
-                Some((other, _)) => format!("it is a {} folder", excerpt(other)),
-                None => "its manifest.json has another schema".into(),
-            },
-        )
     }
 
     /// Returns the first difference from the `kept` manifest in words, finished or not; `None` if there is none.
@@ -104,12 +89,10 @@ impl Manifest {
         let differs = |key: &&String| *key != CHECKSUMS && kept.get(key) != self.get(key);
         let key = { keys }.find(differs)?;
         let (old, new) = (shown(kept.get(key)), shown(self.get(key)));
-        let both = format!("{key} was {old}, now it is {new}");
-        let short = old.chars().count().max(new.chars().count()) <= SHORT;
-        Some(excerpt(&if short {
-            both
-        } else {
-            format!("{key} differs")
+        let longest = old.chars().count().max(new.chars().count());
+        Some(excerpt(&match longest <= SHORT {
+            true => format!("{key} was {old}, now it is {new}"),
+            false => format!("{key} differs"),
         }))
     }
 }

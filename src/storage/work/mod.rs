@@ -9,13 +9,11 @@
 //! | do a share of the pieces: of a job array, of the ranks of a cluster | [`Share`] |
 
 mod folder;
-mod lock;
 mod manifest;
 mod pieces;
 mod ranks;
 mod share;
 
-pub(crate) use folder::NewWork;
 pub use folder::WorkFolder;
 pub(crate) use manifest::{Manifest, checksum};
 pub(crate) use pieces::{Piece, Pieces};

@@ -50,7 +50,7 @@ impl Ranks {
     fn of_launch(ranks: usize) -> Result<Self, StorageError> {
         match ranks {
             0 | 1 => Ok(Self::alone()),
-            ranks => Err(StorageError::NoMpi { ranks }),
+            ranks => Err(StorageError::NoMpi(ranks)),
         }
     }
 

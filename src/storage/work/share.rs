@@ -1,7 +1,6 @@
 //! Shares of numbered work.
 
 use crate::storage::StorageError;
-use std::fmt;
 use std::str::FromStr;
 
 /// Share `index` of `of`: it has piece k if k ≡ index (mod of).
@@ -47,12 +46,6 @@ impl FromStr for Share {
         let (index, of) = text.split_once('/').ok_or_else(wrong)?;
         let number = |digits: &str| digits.parse().map_err(|_| wrong());
         Self::new(number(index)?, number(of)?)
-    }
-}
-
-impl fmt::Display for Share {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.index, self.of)
     }
 }
 
