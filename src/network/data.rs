@@ -16,6 +16,10 @@ const BLOCK: usize = 64 << 20;
 /// Features (rows × n) and targets (rows × d) of one part.
 pub type SamplePart<'a> = (Cow<'a, Array2<f64>>, Cow<'a, Array2<f64>>);
 
+/// Reads a part of samples.
+pub type ReadSamples<'a> =
+    dyn Fn(usize) -> Result<SamplePart<'a>, Box<dyn Error + Send + Sync>> + 'a;
+
 /// Rows of features and targets, both standardised, that need not fit into memory at once: they come in parts.
 ///
 /// Rows are independent of each other and alike, so that any parts are a sample of the whole.
@@ -27,7 +31,7 @@ pub struct Samples<'a> {
     /// Rows of each part, in order.
     pub parts: Vec<usize>,
     /// Reads part number i; it is asked for once an epoch.
-    pub read: Box<dyn Fn(usize) -> Result<SamplePart<'a>, Box<dyn Error + Send + Sync>> + 'a>,
+    pub read: Box<ReadSamples<'a>>,
 }
 
 debug_by_name!(Samples<'_>);

@@ -169,13 +169,16 @@ impl Shards {
         damaged(&self.place(number), "another number of features")
     }
 
-    /// Checks whether a shard is there and is what it was.
-    pub fn is_sound(&self, number: usize) -> Result<bool, EstimatorError> {
-        match self.bytes(number) {
-            Ok(_) => Ok(true),
-            Err(EstimatorError::NoBank { .. }) => Ok(false),
+    /// Returns whether a shard is there and is what it was; removes one that is not.
+    pub fn keeps(&self, number: usize) -> Result<bool, EstimatorError> {
+        match (self.bytes(number), self.file(number)) {
+            (Ok(_), _) => Ok(true),
+            (Err(EstimatorError::NoBank { .. }), Some(path)) => std::fs::remove_file(&path)
+                .map(|()| false)
+                .map_err(|error| EstimatorError::io(&path, error)),
+            (Err(EstimatorError::NoBank { .. }), None) => Ok(false),
             // A file that cannot be read now may be sound.
-            Err(error) => Err(error),
+            (Err(error), _) => Err(error),
         }
     }
 
@@ -185,16 +188,6 @@ impl Shards {
         match write_new(&path, bytes) {
             Err(error) if !path.exists() => Err(EstimatorError::io(&path, error)),
             _ => Ok(()),
-        }
-    }
-
-    /// Removes a shard that is not what it was.
-    pub fn remove(&self, number: usize) -> Result<(), EstimatorError> {
-        match self.file(number) {
-            Some(path) => {
-                std::fs::remove_file(&path).map_err(|error| EstimatorError::io(&path, error))
-            }
-            None => Ok(()),
         }
     }
 

@@ -86,8 +86,7 @@ impl BankPlan {
         let stage = progress.stage("kept shards", mine().count());
         let mut missing = Vec::new();
         for number in mine() {
-            if !shards.is_sound(number)? {
-                shards.remove(number)?;
+            if !shards.keeps(number)? {
                 missing.push(number);
             }
             stage.tick()?;
