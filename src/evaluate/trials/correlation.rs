@@ -3,7 +3,7 @@
 use super::information::problem;
 use super::law::DeparturePlace;
 use super::places::TwinPlaces;
-use super::world::Conditions;
+use super::world::{Conditions, System};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::fit::climb::climb;
 use crate::likelihood::kalman::{FilterError, recoverable};
@@ -20,13 +20,9 @@ pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String
     }
     let records = std::slice::from_ref(record);
     let centre = study.twin().parameters().centre();
-    let (problem, _) = problem(
-        study.twin(),
-        study,
-        &centre,
-        &Conditions::declared(),
-        records,
-    )?;
+    let conditions = Conditions::declared();
+    let system = System::new(&centre, &conditions);
+    let (problem, _) = problem(study.twin(), study, system, records)?;
     let begin = problem.begin(&problem.centre());
     let Some(fitted) = climb(&problem, &begin, TRIAL.correlation_iterations)? else {
         return Ok(None);

@@ -19,7 +19,7 @@
 //! The two records of a pair share all noise. Two pairs with the same process noise and different measurement noise are made, and the square is
 //! taken across them: what only the noise decides, as the rounding of a sensor, then counts for nothing.
 
-use super::world::Conditions;
+use super::world::System;
 use crate::fit::axis::Axis;
 use crate::fit::climb::fit;
 use crate::fit::problem::Problem;
@@ -41,9 +41,9 @@ const MOST: usize = 1000;
 const ITERATIONS: usize = 30;
 
 /// Whitened change of the innovations of two records.
-pub(super) struct Change([DVector<f64>; 2]);
+pub(super) struct InnovationChange([DVector<f64>; 2]);
 
-impl Change {
+impl InnovationChange {
     /// Returns the part of this change that another one does not make.
     pub fn without(&self, other: &Self) -> Self {
         Self([0, 1].map(|i| &self.0[i] - &other.0[i]))
@@ -79,26 +79,18 @@ pub(super) struct Information {
 }
 
 /// θ and noise levels as they are in a world.
-fn truth(
-    twin: &Twin,
-    own: &[f64],
-    conditions: &Conditions,
-    declared: &[(String, f64)],
-) -> Vec<f64> {
+fn truth(twin: &Twin, system: System<'_>, declared: &[(String, f64)]) -> Vec<f64> {
     let outputs = twin.signals().outputs;
-    let space = twin.parameters();
+    let (space, conditions) = (twin.parameters(), system.conditions);
     (space.iter().enumerate())
-        .map(|(j, p)| match own.get(j) {
+        .map(|(j, p)| match system.theta.get(j) {
             Some(value) => *value,
             None if p.role == Role::Noise => {
                 let level = (declared.iter()).find(|(name, _)| *name == p.name);
                 let level = level.map_or(0.0, |(_, level)| *level);
                 let output = outputs.iter().position(|o| o.name == p.target());
                 let level = match output {
-                    Some(j) => {
-                        let added = conditions.added.get(j).copied().unwrap_or(0.0);
-                        conditions.measurement * level.hypot(added)
-                    }
+                    Some(j) => conditions.measurement * level.hypot(conditions.added_to(j)),
                     None => conditions.process * level,
                 };
                 p.bounds.clamp(level)
@@ -112,8 +104,7 @@ fn truth(
 pub(super) fn problem(
     twin: &Twin,
     study: &Study,
-    theta: &[f64],
-    conditions: &Conditions,
+    system: System<'_>,
     records: &[Record],
 ) -> Result<(Problem, Vec<f64>), FilterError> {
     let measured = measured(twin, records, &study.beliefs())?;
@@ -121,7 +112,7 @@ pub(super) fn problem(
     let declared: Vec<(String, f64)> = (levels.iter())
         .map(|level| (level.parameter.name.clone(), level.declared.unwrap_or(0.0)))
         .collect();
-    let truth = truth(&twin, theta, conditions, &declared);
+    let truth = truth(&twin, system, &declared);
     if levels.is_empty() {
         return Ok((Problem::of_twin(&twin, records), truth));
     }
@@ -138,21 +129,21 @@ impl Information {
     /// noise of the other sign; `None` where the filter fails.
     pub fn new(
         study: &Study,
-        theta: &[f64],
-        conditions: &Conditions,
-        [record, again, mirrored]: [&[Record]; 3],
+        system: System<'_>,
+        [record, again, mirrored]: &[Record; 3],
     ) -> Result<Option<Self>, FilterError> {
-        let (problem, theta) = problem(study.twin(), study, theta, conditions, record)?;
+        let records = std::slice::from_ref(record);
+        let (problem, theta) = problem(study.twin(), study, system, records)?;
         let known = weak(&problem) * KNOWN;
         let Some(first) = recoverable(Reference::knowing(&problem, &theta, &known))?.flatten()
         else {
             return Ok(None);
         };
-        let Some(again) = recoverable(problem.on(again).filtered(&theta))? else {
+        let Some(again) = recoverable(problem.on([again.clone()]).filtered(&theta))? else {
             return Ok(None);
         };
-        let costs_ensembles = problem.is_simulated()
-            && (problem.twin.known_noise(&theta, record[0].drive())?).is_none();
+        let costs_ensembles =
+            problem.is_simulated() && (problem.twin.known_noise(&theta, record.drive())?).is_none();
         let mut information = Self {
             again: Reference::bare(again),
             alone: 0.0,
@@ -162,7 +153,7 @@ impl Information {
             theta,
         };
         if !information.costs_ensembles {
-            let Some(alone) = information.best([&record[0], &mirrored[0]])? else {
+            let Some(alone) = information.best([record, mirrored])? else {
                 return Ok(None);
             };
             information.alone = alone;
@@ -196,31 +187,34 @@ impl Information {
     }
 
     /// The change that departures make in the innovations, from the records with them; `None` where the filter fails.
-    pub fn change(&self, [record, again]: [Record; 2]) -> Result<Option<Change>, FilterError> {
+    pub fn change(
+        &self,
+        [record, again]: [Record; 2],
+    ) -> Result<Option<InnovationChange>, FilterError> {
         let filtered =
             |record: Record| recoverable(self.problem.on([record]).filtered(&self.theta));
         let (Some(record), Some(again)) = (filtered(record)?, filtered(again)?) else {
             return Ok(None);
         };
-        Ok(Some(Change([
+        Ok(Some(InnovationChange([
             self.first.direction(&record),
             self.again.direction(&again),
         ])))
     }
 
     /// Expected information of a change, in nats.
-    pub fn nats(&self, change: &Change) -> f64 {
+    pub fn nats(&self, change: &InnovationChange) -> f64 {
         0.5 * self.product(&change.0[0], &change.0[1]).max(0.0)
     }
 
     /// Share of a change's information that no multiple of another one explains.
-    pub fn unexplained(&self, change: &Change, by: &Change) -> f64 {
+    pub fn unexplained(&self, change: &InnovationChange, by: &InnovationChange) -> f64 {
         self.matched(change, by).unexplained
     }
 
     /// Returns the best multiple of one change in place of another, and what that leaves.
-    pub fn matched(&self, change: &Change, by: &Change) -> Match {
-        let own = |a: &Change| self.product(&a.0[0], &a.0[1]).max(0.0);
+    pub fn matched(&self, change: &InnovationChange, by: &InnovationChange) -> Match {
+        let own = |a: &InnovationChange| self.product(&a.0[0], &a.0[1]).max(0.0);
         let (a, b) = (own(change), own(by));
         if a == 0.0 || b == 0.0 {
             return Match::NONE;
@@ -234,7 +228,7 @@ impl Information {
     }
 
     /// Nats of the difference of two changes: what one in place of the other leaves.
-    pub fn left(&self, change: &Change, by: &Change) -> f64 {
+    pub fn left(&self, change: &InnovationChange, by: &InnovationChange) -> f64 {
         self.nats(&change.without(by))
     }
 
@@ -244,13 +238,12 @@ impl Information {
     }
 
     /// Nats by which the twin's own step shows: as a departure, against twenty times as many substeps. 0 for a black box.
-    pub fn step(&self, study: &Study, conditions: &Conditions) -> Result<f64, FilterError> {
+    pub fn step(&self, study: &Study, system: System<'_>) -> Result<f64, FilterError> {
         let fine = (study.twin()).stepped(|_, to| to.substeps = (FINE * to.substeps).min(MOST));
         let Some(fine) = fine else {
             return Ok(0.0);
         };
-        let own = &self.theta[..study.twin().parameters().len()];
-        let (problem, theta) = problem(&fine, study, own, conditions, &self.problem.records)?;
+        let (problem, theta) = problem(&fine, study, system, &self.problem.records)?;
         let filtered = recoverable(problem.filtered(&theta))?;
         Ok(filtered.map_or(0.0, |there| {
             let direction = self.first.direction(&there);
@@ -262,6 +255,7 @@ impl Information {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluate::trials::world::Conditions;
     use crate::record::{Drive, Signal};
     use crate::study::RecordPlan;
     use crate::twin::{Noise, Parameter, ParameterSpace, SimulationError};
@@ -299,18 +293,17 @@ mod tests {
         let record = |seed| {
             let mut source = Noise::new(seed, "b", 0).source("v");
             let outputs = drive.inputs().mapv(|u| u + 0.05 * source.normal());
-            [Record::new(drive.clone(), outputs).unwrap()]
+            Record::new(drive.clone(), outputs).unwrap()
         };
-        let [a, b, c] = [1, 2, 3].map(record);
-        let information = Information::new(&study, &[1.0], &conditions, [&a, &b, &c]);
+        let records = [1, 2, 3].map(record);
+        let system = System::new(&[1.0], &conditions);
+        let information = Information::new(&study, system, &records);
         let information = information.unwrap().unwrap();
         RUNS.store(0, Ordering::Relaxed);
-        assert_eq!(
-            information.lost([&a[0], &c[0]]).unwrap(),
-            Some(f64::INFINITY)
-        );
+        let [a, _, c] = &records;
+        assert_eq!(information.lost([a, c]).unwrap(), Some(f64::INFINITY));
         assert_eq!(RUNS.load(Ordering::Relaxed), 0);
-        information.best([&a[0], &c[0]]).unwrap();
+        information.best([a, c]).unwrap();
         assert!(RUNS.load(Ordering::Relaxed) > 0);
         assert_eq!(information.alone, 0.0);
     }

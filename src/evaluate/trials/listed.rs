@@ -5,7 +5,7 @@
 use super::law::{
     DepartureLaw, DeparturePlace, ForceDeparture, ParameterDeparture, SignalDeparture, Wave,
 };
-use super::scene::{Extent, Scene};
+use super::scene::{Scene, SignalExtent};
 use std::f64::consts::{PI, TAU};
 
 /// A law of the library as worlds have it.
@@ -163,7 +163,7 @@ pub(super) struct Sizing<'s> {
 
 impl Sizing<'_> {
     /// Range of the signal at a sensor or an actuator.
-    fn range(&self) -> Option<Extent> {
+    fn range(&self) -> Option<SignalExtent> {
         match self.place {
             DeparturePlace::Sensor(j) => Some(self.scene.outputs[j]),
             DeparturePlace::Actuator(j) => Some(self.scene.inputs[j]),

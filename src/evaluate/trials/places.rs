@@ -8,6 +8,7 @@ use crate::twin::{Role, Source, Twin, is_memory};
 /// Places of a twin and their names.
 #[derive(Debug, Clone)]
 pub(super) struct TwinPlaces {
+    /// In the order of their kinds.
     named: Vec<(DeparturePlace, String)>,
     /// Names of the states.
     pub states: Vec<String>,
@@ -46,14 +47,16 @@ impl TwinPlaces {
 
     /// The place with this name that suits an effect of this id, whose first word is its kind of place.
     pub fn find(&self, id: &str, target: &str) -> Option<DeparturePlace> {
-        let suits = |place: &DeparturePlace| match id.split('-').next() {
-            Some("sensor") => matches!(place, DeparturePlace::Sensor(_)),
-            Some("actuator") => matches!(place, DeparturePlace::Actuator(_)),
-            Some("parameter") => matches!(place, DeparturePlace::Parameter(_)),
-            _ => matches!(place, DeparturePlace::State(_)),
-        };
+        let word = id.split('-').next();
+        let kinds = [
+            TargetKind::Sensor,
+            TargetKind::Actuator,
+            TargetKind::Parameter,
+        ];
+        let kind = kinds.into_iter().find(|kind| word == Some(kind.name()));
+        let kind = kind.unwrap_or(TargetKind::State);
         (self.named.iter())
-            .find(|(place, name)| suits(place) && name == target)
+            .find(|(place, name)| place.kind() == kind && name == target)
             .map(|(place, _)| *place)
     }
 
@@ -66,21 +69,13 @@ impl TwinPlaces {
 
     /// Draws a kind of place, then a place: a twin of many parameters has sensors all the same.
     pub fn draw(&self, source: &mut Source) -> Option<DeparturePlace> {
-        let kinds: [fn(&DeparturePlace) -> bool; 4] = [
-            |place| matches!(place, DeparturePlace::Sensor(_)),
-            |place| matches!(place, DeparturePlace::Actuator(_)),
-            |place| matches!(place, DeparturePlace::State(_)),
-            |place| matches!(place, DeparturePlace::Parameter(_)),
-        ];
-        let mut groups: Vec<Vec<DeparturePlace>> = (kinds.iter())
-            .map(|is| self.all().filter(is).collect())
-            .collect();
-        groups.retain(|group| !group.is_empty());
+        let by_kind = self.named.chunk_by(|(a, _), (b, _)| a.kind() == b.kind());
+        let groups: Vec<_> = by_kind.collect();
         if groups.is_empty() {
             return None;
         }
-        let group = &groups[index(source, groups.len())];
-        Some(group[index(source, group.len())])
+        let group = groups[index(source, groups.len())];
+        Some(group[index(source, group.len())].0)
     }
 
     /// All places.

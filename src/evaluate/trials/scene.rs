@@ -8,7 +8,7 @@ use crate::record::{Drive, Signal};
 
 /// Range and spread of one signal.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
+pub(super) struct SignalExtent {
     pub low: f64,
     pub high: f64,
     pub deviation: f64,
@@ -16,7 +16,7 @@ pub(super) struct Extent {
     pub rms: f64,
 }
 
-impl Extent {
+impl SignalExtent {
     fn of(values: &[f64]) -> Self {
         let present: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         let (low, high) = ends(&present);
@@ -39,18 +39,19 @@ impl Extent {
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
     pub run: WorldRun,
-    pub states: Vec<Extent>,
-    pub rates: Vec<Extent>,
-    pub inputs: Vec<Extent>,
-    pub outputs: Vec<Extent>,
+    pub draws: RecordNoise,
+    pub states: Vec<SignalExtent>,
+    pub rates: Vec<SignalExtent>,
+    pub inputs: Vec<SignalExtent>,
+    pub outputs: Vec<SignalExtent>,
     /// In seconds.
     pub duration: f64,
     pub dt: f64,
 }
 
-fn sizes(signal: &Signal) -> Vec<Extent> {
+fn sizes(signal: &Signal) -> Vec<SignalExtent> {
     (signal.columns().into_iter())
-        .map(|column| Extent::of(&column.to_vec()))
+        .map(|column| SignalExtent::of(&column.to_vec()))
         .collect()
 }
 
@@ -58,12 +59,7 @@ impl Scene {
     /// Simulates the world at θ; `None` where it diverges.
     pub fn new(world: &World, theta: &[f64], drive: &Drive, draws: RecordNoise) -> Option<Self> {
         let conditions = Conditions::declared();
-        let system = System {
-            theta,
-            departures: &[],
-            conditions: &conditions,
-        };
-        let run = world.run(system, drive, draws)?;
+        let run = world.run(System::new(theta, &conditions), drive, draws)?;
         Some(Self {
             states: sizes(&run.states),
             rates: sizes(&run.rates),
@@ -72,6 +68,7 @@ impl Scene {
             duration: drive.samples() as f64 * drive.dt(),
             dt: drive.dt(),
             run,
+            draws,
         })
     }
 
@@ -131,16 +128,14 @@ impl Scene {
     pub fn moments(&self, place: DeparturePlace) -> Vec<Moment<'_>> {
         let run = &self.run;
         (0..run.drive.samples())
-            .map(|k| Moment {
-                t: run.drive.time(k),
-                x: row(&run.states, k),
-                u: run.drive.input(k),
-                own: match place {
+            .map(|k| {
+                let now = Moment::new(run.drive.time(k), row(&run.states, k), run.drive.input(k));
+                now.at(match place {
                     DeparturePlace::State(i) => run.states[[k, i]],
                     DeparturePlace::Actuator(j) => run.drive.inputs()[[k, j]],
                     DeparturePlace::Sensor(j) => run.outputs[[k, j]],
                     DeparturePlace::Parameter(_) => 0.0,
-                },
+                })
             })
             .collect()
     }

@@ -9,7 +9,7 @@
 //! A law missing at the first place is as well a law missing at the second: no record tells which.
 
 use super::law::DeparturePlace;
-use super::scene::{Extent, Scene};
+use super::scene::{Scene, SignalExtent};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::twin::{Composed, Now};
 
@@ -170,7 +170,7 @@ fn gain(
                 .all(|(own, there)| (own - there).abs() <= TRIAL.structure_rounding * most)
         })
     };
-    let step_of = |size: &Extent| TRIAL.structure_range * size.span();
+    let step_of = |size: &SignalExtent| TRIAL.structure_range * size.span();
     let mut states = scene.states.iter().enumerate();
     if decides(&|at: &mut At| at.t += TRIAL.structure_range * scene.duration)
         || states.any(|(i, size)| decides(&|at: &mut At| at.x[i] += step_of(size)))

@@ -43,22 +43,12 @@ impl FromStr for Families {
     }
 }
 
-/// Kinds of place, which families are told apart by.
-fn kind_of(place: DeparturePlace) -> &'static str {
-    match place {
-        DeparturePlace::State(_) => "state",
-        DeparturePlace::Sensor(_) => "sensor",
-        DeparturePlace::Actuator(_) => "actuator",
-        DeparturePlace::Parameter(_) => "parameter",
-    }
-}
-
 impl Families {
     /// Families of this half at a place. Each kind of place has half of them in either half.
     pub(in crate::evaluate::trials) fn at(self, place: DeparturePlace) -> Vec<LawFamily> {
         let mut all: Vec<(f64, LawFamily)> = (LawFamily::all().into_iter())
             .map(|family| {
-                let name = format!("{family}/{}", kind_of(place));
+                let name = format!("{family}/{}", place.kind().name());
                 let lot = Noise::new(SPLIT, "families", 0).source(&name).uniform();
                 (lot, family)
             })

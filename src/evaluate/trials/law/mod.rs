@@ -22,6 +22,7 @@ pub(super) use parameter::ParameterDeparture;
 pub(super) use random::{Argument, LawFamily, LawVariable, RandomLaw};
 pub(super) use signal::SignalDeparture;
 
+use crate::effect::TargetKind;
 use serde::{Deserialize, Serialize};
 
 /// Place where a system differs from its twin; indices are those of the twin's outline.
@@ -32,6 +33,18 @@ pub(super) enum DeparturePlace {
     Actuator(usize),
     Sensor(usize),
     Parameter(usize),
+}
+
+impl DeparturePlace {
+    /// Kind of place, as the library of effects has it.
+    pub fn kind(self) -> TargetKind {
+        match self {
+            Self::State(_) => TargetKind::State,
+            Self::Actuator(_) => TargetKind::Actuator,
+            Self::Sensor(_) => TargetKind::Sensor,
+            Self::Parameter(_) => TargetKind::Parameter,
+        }
+    }
 }
 
 /// Law of a departure.
@@ -56,6 +69,14 @@ pub(super) enum DepartureLaw {
 }
 
 impl DepartureLaw {
+    /// Returns true for a law that acts on the noisy reading, not on the signal before its noise.
+    pub fn is_of_readings(&self) -> bool {
+        matches!(
+            self,
+            Self::Signal(SignalDeparture::Saturation { .. } | SignalDeparture::Quantization { .. })
+        )
+    }
+
     /// A signal behind a sensor's or actuator's law; `now.own` is the signal before it. Other laws leave it alone.
     pub fn through(&self, now: &Moment<'_>, dt: f64, memory: &mut Vec<f64>) -> f64 {
         match self {
@@ -65,6 +86,18 @@ impl DepartureLaw {
                 now.own + law.at(now, memory)
             }
             Self::Force(_) | Self::Ceiling { .. } | Self::Parameter(_) => now.own,
+        }
+    }
+
+    /// A factor on a parameter, which is `now.own`; 1 of other laws.
+    pub fn factor(&self, now: &Moment<'_>, dt: f64, memory: &mut Vec<f64>) -> f64 {
+        match self {
+            Self::Parameter(law) => law.at(now.t),
+            Self::Random(law) => {
+                law.remember(now, dt, memory);
+                law.at(now, memory).clamp(-5.0, 5.0).exp()
+            }
+            Self::Signal(_) | Self::Force(_) | Self::Ceiling { .. } => 1.0,
         }
     }
 }
@@ -88,6 +121,19 @@ pub(super) struct Moment<'a> {
     pub u: &'a [f64],
     /// Signal at the place itself.
     pub own: f64,
+}
+
+impl<'a> Moment<'a> {
+    /// An instant at no place.
+    pub fn new(t: f64, x: &'a [f64], u: &'a [f64]) -> Self {
+        let own = 0.0;
+        Self { t, x, u, own }
+    }
+
+    /// The same at a place with this signal.
+    pub fn at(self, own: f64) -> Self {
+        Self { own, ..self }
+    }
 }
 
 /// Part of `v` above zero; with a knee, rounded over about that width.

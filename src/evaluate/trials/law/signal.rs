@@ -43,11 +43,6 @@ pub(in crate::evaluate::trials) enum SignalDeparture {
 }
 
 impl SignalDeparture {
-    /// Returns true for a law that acts on the noisy reading, not on the signal before its noise.
-    pub fn is_of_readings(&self) -> bool {
-        matches!(self, Self::Saturation { .. } | Self::Quantization { .. })
-    }
-
     /// The distorted value at time `t`. `memory` is empty at first and belongs to the law.
     pub fn at(&self, t: f64, dt: f64, memory: &mut Vec<f64>, v: f64) -> f64 {
         match *self {

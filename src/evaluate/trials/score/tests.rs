@@ -5,7 +5,7 @@ use crate::evaluate::trials::answer::TrueShare;
 use crate::evaluate::trials::answer::{NamedEffect, Outcome, Repeat};
 use crate::evaluate::trials::fixture::{abstaining, card, failed, row};
 use crate::evaluate::trials::row::{Fate, TrialRow};
-use crate::evaluate::trials::truth::Rival;
+use crate::evaluate::trials::truth::NearestEffect;
 
 fn outcome(row: &mut TrialRow) -> &mut Outcome {
     row.answer.outcome.as_mut().unwrap()
@@ -26,7 +26,7 @@ fn partial(mut row: TrialRow) -> TrialRow {
 
 /// A row whose nearest wrong effect leaves so many nats.
 fn rivalled(mut row: TrialRow, nats: f64) -> TrialRow {
-    row.truth.rival = Some(Rival {
+    row.truth.rival = Some(NearestEffect {
         effect: "r@s".into(),
         nats,
     });

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 /// A listed effect that is no right answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Rival {
+pub(crate) struct NearestEffect {
     /// `id@target`.
     pub effect: String,
     /// Nats of the departure that it leaves at best.
@@ -54,7 +54,7 @@ pub(crate) struct Truth {
     /// For each departure the listed effects that are a right answer.
     pub right: Vec<Vec<String>>,
     /// The listed effect nearest to a departure that is no right answer; none for a black box, and where nothing is missing.
-    pub rival: Option<Rival>,
+    pub rival: Option<NearestEffect>,
     /// Places where the twin is wrong.
     pub targets: Vec<String>,
     /// These, and the places that mean the same by the structure of the equations.

@@ -4,11 +4,10 @@ use super::Truth;
 use super::imitators::{Imitators, rival};
 use super::listed::Listed;
 use super::prior::{conditions, has_room, nuisances, theta};
-use super::reject::Reject;
-use super::sizing::Stage;
+use super::reject::{DrawEnd, Reject};
+use super::sizing::Experiment;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::{Draft, index};
-use crate::evaluate::trials::information::Information;
 use crate::evaluate::trials::listed::LawForm;
 use crate::evaluate::trials::places::TwinPlaces;
 use crate::evaluate::trials::scene::Scene;
@@ -94,53 +93,36 @@ impl<'a> TruthSampler<'a> {
     fn finds_silence(&self) -> Result<bool, EvaluateError> {
         let conditions = Conditions::declared();
         let theta = self.space.centre();
-        let system = System {
-            theta: &theta,
-            departures: &[],
-            conditions: &conditions,
-        };
+        let system = System::new(&theta, &conditions);
         let noise = Noise::new(1, "silence", 0);
         let drive = self.drive(noise)?;
         let outputs = |i: u64| {
-            let run = self
-                .world
-                .run(system, &drive, RecordNoise::of(noise.sample(i)));
-            run.map(|run| run.outputs)
+            let draws = RecordNoise::of(noise.sample(i));
+            Some(self.world.run(system, &drive, draws)?.outputs)
         };
         Ok(matches!((outputs(0), outputs(1)), (Some(a), Some(b)) if a == b))
     }
 
     /// Checks that a truth of this kind can be drawn.
     pub fn check(&self, kind: Kind) -> Result<(), EvaluateError> {
-        let refused = |reason| {
-            Err(EvaluateError::NoDeparture {
-                kind: kind.id(),
-                reason,
-            })
-        };
-        let first = self.listed.first();
-        if kind.is_outside() && !has_room(&self.space) {
-            return refused("the bounds leave no room outside the prior; widen them");
-        }
-        match kind {
-            Kind::None | Kind::Outside => Ok(()),
-            Kind::Random if self.places.all().next().is_none() => {
-                refused("the twin has no place for one")
+        let first = self.listed.first().map(|listed| listed.place);
+        let is_at_one_place = self.listed.iter().all(|l| Some(l.place) == first);
+        let reason = match kind {
+            _ if kind.is_outside() && !has_room(&self.space) => {
+                "the bounds leave no room outside the prior; widen them"
             }
-            Kind::Random => Ok(()),
+            Kind::Random if self.places.all().next().is_none() => "the twin has no place for one",
+            Kind::None | Kind::Outside | Kind::Random => return Ok(()),
             _ if first.is_none() => {
-                refused("the library leaves no effect that trials can make; allow more effects")
+                "the library leaves no effect that trials can make; allow more effects"
             }
-            Kind::Pair
-                if self
-                    .listed
-                    .iter()
-                    .all(|l| Some(l.place) == first.map(|f| f.place)) =>
-            {
-                refused("the library leaves effects at one place only; allow more effects")
+            Kind::Pair if is_at_one_place => {
+                "the library leaves effects at one place only; allow more effects"
             }
-            _ => Ok(()),
-        }
+            _ => return Ok(()),
+        };
+        let kind = kind.id();
+        Err(EvaluateError::NoDeparture { kind, reason })
     }
 
     /// Draws trial number `trial`: the same for the same noise.
@@ -154,12 +136,13 @@ impl<'a> TruthSampler<'a> {
         let mut rejected: BTreeMap<Reject, u64> = BTreeMap::new();
         for redraws in 0..ATTEMPTS {
             let noise = noise.child("attempt").sample(redraws);
-            match self.attempt(trial, kind, extra, noise)? {
+            match self.attempt(trial, kind, extra, noise) {
                 Ok(mut drawn) => {
                     drawn.truth.redraws = redraws;
                     return Ok(drawn);
                 }
-                Err(reject) => *rejected.entry(reject).or_default() += 1,
+                Err(DrawEnd::Rejected(reject)) => *rejected.entry(reject).or_default() += 1,
+                Err(DrawEnd::Failed(error)) => return Err(error),
             }
         }
         let counts = (rejected.iter())
@@ -179,35 +162,20 @@ impl<'a> TruthSampler<'a> {
         kind: Kind,
         extra: Extra,
         noise: Noise,
-    ) -> Result<Result<Drawn, Reject>, EvaluateError> {
+    ) -> Result<Drawn, DrawEnd> {
         let source = &mut noise.source("truth");
         let theta = theta(kind, &self.space, self.space.draw_prior(noise), source);
         let drive = self.drive(noise)?;
-        let draws = RecordNoise::of(noise);
-        let Some(scene) = Scene::new(&self.world, &theta, &drive, draws) else {
-            return Ok(Err(Reject::Diverged));
-        };
+        let scene = Scene::new(&self.world, &theta, &drive, RecordNoise::of(noise));
+        let scene = scene.ok_or(Reject::Diverged)?;
         if scene.is_still() {
-            return Ok(Err(Reject::Still));
+            return Err(Reject::Still.into());
         }
         let is_noisy = self.is_silent || !self.world.is_black_box();
         let allowed = nuisances(&scene, is_noisy);
         let conditions = conditions(&scene, self.is_silent, &allowed, source);
-        let stage = Stage {
-            world: &self.world,
-            theta: &theta,
-            conditions: &conditions,
-            drive: &drive,
-            draws,
-            scene: &scene,
-        };
-        let Some(plain) = stage.records(&[]) else {
-            return Ok(Err(Reject::Diverged));
-        };
-        let plain = plain.each_ref().map(std::slice::from_ref);
-        let Some(information) = Information::new(self.study, &theta, &conditions, plain)? else {
-            return Ok(Err(Reject::NoFilter));
-        };
+        let system = System::new(&theta, &conditions);
+        let experiment = Experiment::new(self.study, &self.world, system, &scene)?;
         let mut truth = Truth {
             trial,
             kind,
@@ -222,21 +190,16 @@ impl<'a> TruthSampler<'a> {
             targets: vec![],
             places: vec![],
             information: None,
-            step: information.step(self.study, &conditions)?,
+            step: experiment.information.step(self.study, system)?,
             redraws: 0,
         };
-        let Some(drafts) = self.drafts(kind, &scene, source) else {
-            return Ok(Err(Reject::NoLaw));
-        };
+        let drafts = self.drafts(kind, &scene, source).ok_or(Reject::NoLaw)?;
         let [low, high] = INFORMATION;
         let wanted: Vec<f64> = (drafts.iter())
             .map(|_| low * (high / low).powf(source.uniform()))
             .collect();
         let own: Vec<&Draft> = drafts.iter().map(|(draft, _)| draft).collect();
-        let all = match stage.all_sized(&own, &wanted, &information)? {
-            Ok(all) => all,
-            Err(reject) => return Ok(Err(reject)),
-        };
+        let all = experiment.all_sized(&own, &wanted)?;
         for ((draft, effect), sized) in drafts.iter().zip(&all) {
             let target = self.places.name(sized.departure.place).to_owned();
             truth.labels.push(draft.label(&target));
@@ -249,45 +212,39 @@ impl<'a> TruthSampler<'a> {
         let imitators = (all.iter().enumerate())
             .map(|(i, sized)| {
                 let own = truth.effects.get(i);
-                Imitators::of(sized, own, &self.listed, &stage, &information)
+                Imitators::of(&experiment, sized, own, &self.listed)
             })
             .collect::<Result<Vec<_>, _>>()?;
         truth.rival = rival(&imitators);
         truth.right = imitators.into_iter().map(|i| i.right).collect();
         truth.places = self.true_places(&truth, &scene);
-        Ok(self.drawn(truth, &drive, extra, noise, &scene))
+        self.drawn(truth, extra, noise, &scene)
     }
 
     /// The records of a truth.
     fn drawn(
         &self,
         truth: Truth,
-        drive: &Drive,
         extra: Extra,
         noise: Noise,
         scene: &Scene,
-    ) -> Result<Drawn, Reject> {
+    ) -> Result<Drawn, DrawEnd> {
+        let drive = &scene.run.drive;
         let record = |drive: &Drive, noise: Noise| {
-            self.record(&truth, drive, noise, scene)
-                .ok_or(Reject::Diverged)
+            let record = self.record(&truth, drive, noise, scene);
+            record.ok_or(DrawEnd::Rejected(Reject::Diverged))
         };
         let own = record(drive, noise)?;
-        let validation = match extra.validation {
-            false => None,
-            true => {
-                let noise = noise.child("validation");
-                let drive = self.drive(noise).map_err(|_| Reject::Diverged)?;
-                Some(record(&drive, noise)?)
-            }
-        };
-        let doubled = match extra.doubled {
-            false => None,
-            true => (doubled(drive).map(|drive| record(&drive, noise))).transpose()?,
-        };
+        let validation = (extra.validation).then(|| {
+            let noise = noise.child("validation");
+            record(&self.drive(noise)?, noise)
+        });
+        let doubled = doubled(drive).filter(|_| extra.doubled);
+        let doubled = doubled.map(|drive| record(&drive, noise));
         Ok(Drawn {
             record: own,
-            validation,
-            doubled,
+            validation: validation.transpose()?,
+            doubled: doubled.transpose()?,
             truth,
         })
     }

@@ -1,13 +1,14 @@
 //! The size at which a departure has the expected information that it is to have.
 
-use super::reject::Reject;
+use super::reject::{DrawEnd, Reject};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::Draft;
-use crate::evaluate::trials::information::{Change, Information};
+use crate::evaluate::trials::information::{Information, InnovationChange};
 use crate::evaluate::trials::law::Departure;
 use crate::evaluate::trials::scene::Scene;
-use crate::evaluate::trials::world::{Conditions, RecordNoise, System, World};
-use crate::record::{Drive, Record};
+use crate::evaluate::trials::world::{RecordNoise, System, World};
+use crate::record::Record;
+use crate::study::Study;
 
 /// First size that is tried: small.
 pub(super) const FIRST: f64 = 0.03;
@@ -23,69 +24,93 @@ const LEAST: f64 = 0.5;
 /// changes how many pairs are drawn again, not how large the others are.
 const OWN: f64 = 0.1;
 
-/// Everything of a trial but its departures.
-pub(super) struct Stage<'a> {
-    pub world: &'a World,
-    pub theta: &'a [f64],
-    pub conditions: &'a Conditions,
-    pub drive: &'a Drive,
-    pub draws: RecordNoise,
+/// The system of a trial without its departures, and the filter that measures what departures change.
+pub(super) struct Experiment<'a> {
+    world: &'a World,
+    system: System<'a>,
     pub scene: &'a Scene,
+    pub information: Information,
 }
 
 /// A departure with its information.
 pub(super) struct Sized {
     pub departure: Departure,
     pub nats: f64,
-    pub change: Change,
+    pub change: InnovationChange,
 }
 
-impl Stage<'_> {
-    /// Makes the record with these departures; once more with other measurement noise; and with all noise of the other sign. `None`
-    /// where one diverges.
-    pub fn records(&self, departures: &[Departure]) -> Option<[Record; 3]> {
-        let [own, again] = self.pair(departures)?;
-        Some([own, again, self.record(departures, self.draws.mirrored())?])
-    }
+/// The record of a system near a scene, with its inputs; `None` where it diverges.
+fn record(world: &World, system: System<'_>, scene: &Scene, draws: RecordNoise) -> Option<Record> {
+    let run = world.run(system, &scene.run.drive, draws)?;
+    let is_near = scene.is_near(&run);
+    Record::new(run.drive, run.outputs).ok().filter(|_| is_near)
+}
 
-    /// The record with these departures, and once more with other measurement noise.
-    fn pair(&self, departures: &[Departure]) -> Option<[Record; 2]> {
-        let [own, again] =
-            [self.draws, self.draws.remeasured()].map(|draws| self.record(departures, draws));
-        Some([own?, again?])
+impl<'a> Experiment<'a> {
+    /// Filters records of the system without departures.
+    pub fn new(
+        study: &Study,
+        world: &'a World,
+        system: System<'a>,
+        scene: &'a Scene,
+    ) -> Result<Self, DrawEnd> {
+        let draws = scene.draws;
+        let record = |draws| record(world, system, scene, draws).ok_or(Reject::Diverged);
+        let (again, mirrored) = (draws.remeasured(), draws.mirrored());
+        let plain = [record(draws)?, record(again)?, record(mirrored)?];
+        let information = Information::new(study, system, &plain)?.ok_or(Reject::NoFilter)?;
+        Ok(Self {
+            world,
+            system,
+            scene,
+            information,
+        })
     }
 
     fn record(&self, departures: &[Departure], draws: RecordNoise) -> Option<Record> {
         let system = System {
-            theta: self.theta,
             departures,
-            conditions: self.conditions,
+            ..self.system
         };
-        let run = self.world.run(system, self.drive, draws)?;
-        if !self.scene.is_near(&run) {
-            return None;
+        record(self.world, system, self.scene, draws)
+    }
+
+    /// The record with these departures, and once more with other measurement noise; `None` where one diverges.
+    pub fn pair(&self, departures: &[Departure]) -> Option<[Record; 2]> {
+        let again = self.scene.draws.remeasured();
+        Some([
+            self.record(departures, self.scene.draws)?,
+            self.record(departures, again)?,
+        ])
+    }
+
+    /// The record with these departures and all noise of the other sign.
+    pub fn mirrored(&self, departures: &[Departure]) -> Option<Record> {
+        self.record(departures, self.scene.draws.mirrored())
+    }
+
+    fn change(&self, departures: &[Departure]) -> Result<Option<InnovationChange>, EvaluateError> {
+        match self.pair(departures) {
+            Some(records) => Ok(self.information.change(records)?),
+            None => Ok(None),
         }
-        Record::new(run.drive, run.outputs).ok()
     }
 
     /// The departure of a size, and what it changes; `None` where it cannot be made or diverges.
-    fn of_size(
-        &self,
-        draft: &Draft,
-        size: f64,
-        information: &Information,
-    ) -> Result<Option<Sized>, EvaluateError> {
+    fn of_size(&self, draft: &Draft, size: f64) -> Result<Option<Sized>, EvaluateError> {
         let Some(departure) = draft.of_size(size, self.scene) else {
             return Ok(None);
         };
-        let Some([own, again, mirrored]) = self.records(std::slice::from_ref(&departure)) else {
+        let departures = std::slice::from_ref(&departure);
+        let (Some(pair), Some(mirrored)) = (self.pair(departures), self.mirrored(departures))
+        else {
             return Ok(None);
         };
-        let Some(lost) = information.lost([&own, &mirrored])? else {
+        let Some(lost) = self.information.lost([&pair[0], &mirrored])? else {
             return Ok(None);
         };
-        Ok(information.change([own, again])?.map(|change| Sized {
-            nats: information.nats(&change).min(lost),
+        Ok(self.information.change(pair)?.map(|change| Sized {
+            nats: self.information.nats(&change).min(lost),
             departure,
             change,
         }))
@@ -96,54 +121,36 @@ impl Stage<'_> {
         &self,
         draft: &Draft,
         size: f64,
-        information: &Information,
-    ) -> Result<Option<Change>, EvaluateError> {
+    ) -> Result<Option<InnovationChange>, EvaluateError> {
         let departure = draft.of_size(size, self.scene);
-        let Some(pair) = departure.and_then(|departure| self.pair(&[departure])) else {
-            return Ok(None);
-        };
-        Ok(information.change(pair)?)
+        departure.map_or(Ok(None), |departure| self.change(&[departure]))
     }
 
     /// The departures at the sizes at which each has about the wanted nats. Of a pair, only what one departure adds to the other counts, and
     /// of that only what no multiple of the other explains.
-    pub fn all_sized(
-        &self,
-        drafts: &[&Draft],
-        wanted: &[f64],
-        information: &Information,
-    ) -> Result<Result<Vec<Sized>, Reject>, EvaluateError> {
+    pub fn all_sized(&self, drafts: &[&Draft], wanted: &[f64]) -> Result<Vec<Sized>, DrawEnd> {
+        let information = &self.information;
         let sized = |each: &[f64]| -> Result<Option<Vec<Sized>>, EvaluateError> {
             (drafts.iter().zip(each))
-                .map(|(draft, nats)| self.sized(draft, *nats, information))
+                .map(|(draft, nats)| self.sized(draft, *nats))
                 .collect()
         };
-        let Some(all) = sized(wanted)? else {
-            return Ok(Err(Reject::TooWeak));
-        };
+        let all = sized(wanted)?.ok_or(Reject::TooWeak)?;
         let [first, second] = &all[..] else {
-            return Ok(Ok(all));
+            return Ok(all);
         };
         let shares = [
             information.unexplained(&first.change, &second.change),
             information.unexplained(&second.change, &first.change),
         ];
         if shares.iter().any(|share| *share < OWN) {
-            return Ok(Err(Reject::TooAlike));
+            return Err(Reject::TooAlike.into());
         }
         let larger: Vec<f64> = wanted.iter().zip(shares).map(|(w, s)| w / s).collect();
-        let Some(mut all) = sized(&larger)? else {
-            return Ok(Err(Reject::TooAlike));
-        };
+        let mut all = sized(&larger)?.ok_or(Reject::TooAlike)?;
         // One departure may hide the other: what counts is what each adds.
         let both: Vec<Departure> = all.iter().map(|sized| sized.departure.clone()).collect();
-        let together = match self.pair(&both) {
-            Some(records) => information.change(records)?,
-            None => None,
-        };
-        let Some(together) = together else {
-            return Ok(Err(Reject::TooAlike));
-        };
+        let together = self.change(&both)?.ok_or(Reject::TooAlike)?;
         let added = [1, 0].map(|other| {
             let by = &all[other].change;
             let added = together.without(by);
@@ -154,18 +161,13 @@ impl Stage<'_> {
         }
         let is_near = |(sized, wanted): (&Sized, &f64)| (sized.nats / wanted).ln().abs() <= FAR;
         match all.iter().zip(wanted).all(is_near) {
-            true => Ok(Ok(all)),
-            false => Ok(Err(Reject::TooAlike)),
+            true => Ok(all),
+            false => Err(Reject::TooAlike.into()),
         }
     }
 
     /// Searches the size at which a departure has about `wanted` nats; `None` where none comes near.
-    pub fn sized(
-        &self,
-        draft: &Draft,
-        wanted: f64,
-        information: &Information,
-    ) -> Result<Option<Sized>, EvaluateError> {
+    pub fn sized(&self, draft: &Draft, wanted: f64) -> Result<Option<Sized>, EvaluateError> {
         let distance = |nats: f64| (nats / wanted).ln().abs();
         let mut best: Option<Sized> = None;
         // Logarithms of size and nats, below and above what is wanted.
@@ -173,20 +175,17 @@ impl Stage<'_> {
         let largest = draft.largest();
         let mut size = FIRST;
         for _ in 0..TRIES {
-            match self.of_size(draft, size, information)? {
+            match self.of_size(draft, size)? {
                 None => above = Some([size.ln(), f64::INFINITY]),
                 Some(sized) => {
                     let nats = sized.nats;
-                    let at = Some([size.ln(), nats.max(1e-9).ln()]);
-                    if nats < wanted {
-                        below = at;
-                    } else {
-                        above = at;
-                    }
-                    if best
-                        .as_ref()
-                        .is_none_or(|b| distance(nats) < distance(b.nats))
-                    {
+                    let end = match nats < wanted {
+                        true => &mut below,
+                        false => &mut above,
+                    };
+                    *end = Some([size.ln(), nats.max(1e-9).ln()]);
+                    let least = best.as_ref().map_or(f64::INFINITY, |b| distance(b.nats));
+                    if best.is_none() || distance(nats) < least {
                         best = Some(sized);
                     }
                     if distance(nats) < NEAR {

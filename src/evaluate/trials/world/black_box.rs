@@ -3,6 +3,7 @@
 use super::{RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{DepartureLaw, DeparturePlace, Moment};
 use crate::evaluate::trials::numbers::TRIAL;
+use crate::math::ends;
 use crate::record::{Drive, Signal};
 use crate::twin::DigitalTwin;
 
@@ -22,27 +23,21 @@ pub(super) fn run(
     let driven = drive.with_inputs(inputs).ok()?;
     let mut outputs = simulated(twin, system, &driven, draws)?;
     let conditions = system.conditions;
-    let mut measurement: Vec<_> = (0..outputs.ncols())
-        .map(|j| conditions.noise(draws.measurement.source(&format!("world/sensor/{j}"))))
-        .collect();
-    for late in [false, true] {
+    let mut measurement = conditions.noises(draws.measurement, "sensor", outputs.ncols());
+    let sense = |late: bool, outputs: &mut Signal| {
         for departure in system.departures {
-            if let DeparturePlace::Sensor(j) = departure.place {
-                let is_late =
-                    matches!(&departure.law, DepartureLaw::Signal(law) if law.is_of_readings());
-                if is_late == late {
-                    pass(&departure.law, j, drive, &mut outputs);
-                }
+            if let DeparturePlace::Sensor(j) = departure.place
+                && departure.law.is_of_readings() == late
+            {
+                pass(&departure.law, j, drive, outputs);
             }
         }
-        if late {
-            break;
-        }
-        for ((_, j), y) in outputs.indexed_iter_mut() {
-            let level = conditions.measurement * conditions.added.get(j).copied().unwrap_or(0.0);
-            *y += level * measurement[j].next();
-        }
+    };
+    sense(false, &mut outputs);
+    for ((_, j), y) in outputs.indexed_iter_mut() {
+        *y += conditions.measurement * conditions.added_to(j) * measurement[j].next();
     }
+    sense(true, &mut outputs);
     if !outputs.iter().all(|y| y.abs() < TRIAL.diverged) {
         return None;
     }
@@ -75,25 +70,12 @@ fn simulated(
     let mut memory = vec![];
     let values: Vec<f64> = (0..drive.samples())
         .map(|k| {
-            let now = Moment {
-                t: drive.time(k),
-                x: &[],
-                u: drive.input(k),
-                own: system.theta[i],
-            };
-            let factor = match law {
-                DepartureLaw::Parameter(law) => law.at(now.t),
-                DepartureLaw::Random(law) => {
-                    law.remember(&now, drive.step(k), &mut memory);
-                    law.at(&now, &memory).clamp(-5.0, 5.0).exp()
-                }
-                _ => 1.0,
-            };
-            system.theta[i] * factor
+            let own = system.theta[i];
+            let now = Moment::new(drive.time(k), &[], drive.input(k)).at(own);
+            own * law.factor(&now, drive.step(k), &mut memory)
         })
         .collect();
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (low, high) = ends(&values);
     if low == high {
         return one(system.theta);
     }
@@ -118,12 +100,7 @@ fn simulated(
 fn pass(law: &DepartureLaw, channel: usize, drive: &Drive, signal: &mut Signal) {
     let mut memory = vec![];
     for k in 0..drive.samples() {
-        let now = Moment {
-            t: drive.time(k),
-            x: &[],
-            u: drive.input(k),
-            own: signal[[k, channel]],
-        };
+        let now = Moment::new(drive.time(k), &[], drive.input(k)).at(signal[[k, channel]]);
         signal[[k, channel]] = law.through(&now, drive.step(k), &mut memory);
     }
 }

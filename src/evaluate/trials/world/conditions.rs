@@ -87,14 +87,25 @@ impl Conditions {
         }
     }
 
-    /// A source of noise of unit variance under these conditions.
-    pub(super) fn noise(&self, source: Source) -> UnitNoise {
+    /// Sources of noise of unit variance under these conditions, one a channel of `what`.
+    pub(super) fn noises(&self, noise: Noise, what: &str, channels: usize) -> Vec<UnitNoise> {
+        (0..channels)
+            .map(|i| self.noise(noise.source(&format!("world/{what}/{i}"))))
+            .collect()
+    }
+
+    fn noise(&self, source: Source) -> UnitNoise {
         UnitNoise {
             source,
             colour: self.colour,
             freedom: self.freedom,
             last: None,
         }
+    }
+
+    /// Standard deviation of measurement noise added to output `j`.
+    pub fn added_to(&self, j: usize) -> f64 {
+        self.added.get(j).copied().unwrap_or(0.0)
     }
 
     /// Empties samples in blocks, never all of a channel.

@@ -25,12 +25,8 @@ pub(super) fn run(
         stage: vec![0.0; n],
         slopes: vec![vec![0.0; n]; 4],
     };
-    let mut process: Vec<_> = (0..n)
-        .map(|i| conditions.noise(draws.process.source(&format!("world/state/{i}"))))
-        .collect();
-    let mut measurement: Vec<_> = (0..p)
-        .map(|j| conditions.noise(draws.measurement.source(&format!("world/sensor/{j}"))))
-        .collect();
+    let mut process = conditions.noises(draws.process, "state", n);
+    let mut measurement = conditions.noises(draws.measurement, "sensor", p);
     let mut x = vec![0.0; n];
     plant.begin(system, drive, draws.process, &mut x)?;
     let samples = drive.samples();
@@ -51,30 +47,25 @@ pub(super) fn run(
             command[0] = wanted.clamp(feedback.low, feedback.high);
             inputs[[k, 0]] = command[0];
         }
-        let u = plant.inputs(t, dt, &x, &command);
-        let u = sent.acting(k, u)?;
-        let theta = plant.theta(system.theta, t, dt, &x, &command);
+        let moment = Moment::new(t, &x, &command);
+        let u = sent.acting(k, plant.inputs(&moment, dt))?;
+        let theta = plant.theta(system.theta, &moment, dt);
         let now = Now::new(t, dt, &u, &theta);
         twin.observe(&now, &x, &mut y);
         dead_time.hold_back(&mut y);
         q.fill(0.0);
         r.fill(0.0);
         twin.noise(&now, &mut q, &mut r);
-        let own = &command;
-        plant.sense(t, dt, &x, own, false, &mut y);
+        plant.sense(&moment, dt, false, &mut y);
         for (j, y) in y.iter_mut().enumerate() {
-            let added = conditions.added.get(j).copied().unwrap_or(0.0);
-            let level = draws.sign * conditions.measurement * r[j].hypot(added);
-            *y += level * measurement[j].next();
+            let level = conditions.measurement * r[j].hypot(conditions.added_to(j));
+            *y += draws.sign * level * measurement[j].next();
         }
-        plant.sense(t, dt, &x, own, true, &mut y);
+        plant.sense(&moment, dt, true, &mut y);
         twin.readout(&now, &mut y);
         twin.drift(&now, &x, &mut rate);
-        for j in 0..p {
-            outputs[[k, j]] = y[j];
-        }
-        for i in 0..n {
-            (states[[k, i]], rates[[k, i]]) = (x[i], rate[i]);
+        for (signal, row) in [(&mut outputs, &y), (&mut states, &x), (&mut rates, &rate)] {
+            signal.row_mut(k).assign(&ArrayView1::from(row));
         }
         twin.update(&now, &mut x);
         // The next sample's inputs, towards which these go where the twin says so.
@@ -172,43 +163,26 @@ impl Plant<'_> {
     }
 
     /// Inputs as they reach the system.
-    fn inputs(&mut self, t: f64, dt: f64, x: &[f64], command: &[f64]) -> Vec<f64> {
-        let mut u = command.to_vec();
+    fn inputs(&mut self, now: &Moment<'_>, dt: f64) -> Vec<f64> {
+        let mut u = now.u.to_vec();
         for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
             if let DeparturePlace::Actuator(j) = departure.place {
-                let now = Moment {
-                    t,
-                    x,
-                    u: command,
-                    own: u[j],
-                };
-                u[j] = departure.law.through(&now, dt, memory);
+                u[j] = departure.law.through(&now.at(u[j]), dt, memory);
             }
         }
         u
     }
 
     /// Parameters at this sample; memories of random forces are moved on, too.
-    fn theta(&mut self, own: &[f64], t: f64, dt: f64, x: &[f64], u: &[f64]) -> Vec<f64> {
+    fn theta(&mut self, own: &[f64], now: &Moment<'_>, dt: f64) -> Vec<f64> {
         let mut theta = own.to_vec();
         for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
             match (departure.place, &departure.law) {
-                (DeparturePlace::Parameter(i), DepartureLaw::Parameter(law)) => {
-                    theta[i] *= law.at(t)
-                }
-                (DeparturePlace::Parameter(i), DepartureLaw::Random(law)) => {
-                    let now = Moment {
-                        t,
-                        x,
-                        u,
-                        own: own[i],
-                    };
-                    law.remember(&now, dt, memory);
-                    theta[i] *= law.at(&now, memory).clamp(-5.0, 5.0).exp();
+                (DeparturePlace::Parameter(i), law) => {
+                    theta[i] *= law.factor(&now.at(own[i]), dt, memory);
                 }
                 (DeparturePlace::State(i), DepartureLaw::Random(law)) => {
-                    let now = Moment { t, x, u, own: x[i] };
-                    law.remember(&now, dt, memory);
+                    law.remember(&now.at(now.x[i]), dt, memory);
                 }
                 _ => {}
             }
@@ -217,15 +191,12 @@ impl Plant<'_> {
     }
 
     /// Puts the outputs through the sensors' laws, before or after their noise.
-    fn sense(&mut self, t: f64, dt: f64, x: &[f64], u: &[f64], readings: bool, y: &mut [f64]) {
+    fn sense(&mut self, now: &Moment<'_>, dt: f64, readings: bool, y: &mut [f64]) {
         for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
-            let DeparturePlace::Sensor(j) = departure.place else {
-                continue;
-            };
-            let late = matches!(&departure.law, DepartureLaw::Signal(law) if law.is_of_readings());
-            if late == readings {
-                let now = Moment { t, x, u, own: y[j] };
-                y[j] = departure.law.through(&now, dt, memory);
+            if let DeparturePlace::Sensor(j) = departure.place
+                && departure.law.is_of_readings() == readings
+            {
+                y[j] = departure.law.through(&now.at(y[j]), dt, memory);
             }
         }
     }
@@ -248,12 +219,7 @@ impl Plant<'_> {
                     *value = x[i] + part * h * before;
                 }
                 self.twin.drift(&at, &self.stage, &mut self.slopes[stage]);
-                let moment = Moment {
-                    t: at.t,
-                    x: &self.stage,
-                    u: command,
-                    own: 0.0,
-                };
+                let moment = Moment::new(at.t, &self.stage, command);
                 for (departure, memory) in self.departures.iter().zip(&self.memories) {
                     if let DeparturePlace::State(i) = departure.place {
                         self.slopes[stage][i] += match &departure.law {

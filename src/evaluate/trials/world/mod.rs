@@ -28,6 +28,18 @@ pub(super) struct System<'s> {
     pub conditions: &'s Conditions,
 }
 
+impl<'s> System<'s> {
+    /// A system without departures.
+    pub fn new(theta: &'s [f64], conditions: &'s Conditions) -> Self {
+        let departures = &[];
+        Self {
+            theta,
+            departures,
+            conditions,
+        }
+    }
+}
+
 /// Everything random in one record, in two parts that can be drawn apart.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RecordNoise {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::evaluate::trials::law::DeparturePlace;
 use crate::evaluate::trials::places::TwinPlaces;
-use crate::evaluate::trials::truth::fixture::on_stage;
+use crate::evaluate::trials::truth::fixture::experiment;
 use crate::study::{RecordPlan, Study};
 use crate::twin::{Now, Outline, Parameter, StateSpace, Stepping};
 
@@ -45,10 +45,10 @@ fn right(id: &str, place: DeparturePlace, sign: f64) -> Vec<String> {
     let listed = Listed::all(&study, &TwinPlaces::new(study.twin()));
     let variant = *Variant::of(id).last().unwrap();
     let variant = Variant { sign, ..variant };
-    on_stage(&study, &[0.7], |stage, information| {
+    experiment(&study, &[0.7], |experiment| {
         let draft = Draft::variant(id, place, None, variant).unwrap();
-        let sized = stage.sized(&draft, 40.0, information).unwrap().unwrap();
-        let all = Imitators::of(&sized, None, &listed, stage, information).unwrap();
+        let sized = experiment.sized(&draft, 40.0).unwrap().unwrap();
+        let all = Imitators::of(experiment, &sized, None, &listed).unwrap();
         let rival = rival(std::slice::from_ref(&all)).unwrap();
         assert!(!all.right.contains(&rival.effect), "{all:?}");
         assert!((0.2..=sized.nats * 1.01).contains(&rival.nats), "{all:?}");
@@ -98,8 +98,8 @@ fn a_dead_zone_that_is_never_entered_is_a_bias() {
 /// The effects of a pair are no rivals of each other.
 #[test]
 fn a_right_answer_to_one_departure_is_no_rival_of_the_other() {
-    let rivals = |wrong: &[(&str, f64)]| -> Vec<Rival> {
-        let rival = |(effect, nats): &(&str, f64)| Rival {
+    let rivals = |wrong: &[(&str, f64)]| -> Vec<NearestEffect> {
+        let rival = |(effect, nats): &(&str, f64)| NearestEffect {
             effect: (*effect).into(),
             nats: *nats,
         };

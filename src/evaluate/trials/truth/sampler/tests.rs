@@ -3,10 +3,9 @@
 use super::*;
 use crate::diagnose::fixture::tanks;
 use crate::evaluate::paper::reference_studies;
-use crate::evaluate::trials::information::Information;
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, SignalDeparture};
-use crate::evaluate::trials::truth::fixture::{on_stage, plain};
-use crate::evaluate::trials::truth::sizing::FIRST;
+use crate::evaluate::trials::truth::fixture::{experiment, plain};
+use crate::evaluate::trials::truth::sizing::{Experiment, FIRST};
 use crate::study::RecordPlan;
 use crate::twin::{Now, Outline, Parameter, StateSpace};
 use crate::twins::VanDerPol;
@@ -160,17 +159,20 @@ fn information_is_that_of_theory() {
         }
     }
     let study = Study::new("level", Level, RecordPlan::levels(0.1, 400, -1.0, 1.0, 5)).unwrap();
-    on_stage(&study, &[1.0], bias_has_its_information);
+    experiment(&study, &[1.0], bias_has_its_information);
 }
 
-fn bias_has_its_information(stage: &Stage<'_>, information: &Information) {
-    let scene = stage.scene;
+fn bias_has_its_information(experiment: &Experiment<'_>) {
+    let (scene, information) = (experiment.scene, &experiment.information);
     let draft = plain("sensor-bias", DeparturePlace::Sensor(0));
     let departure = draft.of_size(0.05, scene).unwrap();
     let bias = 0.05 * scene.outputs[0].deviation;
-    let [own, again, mirrored] = stage.records(&[departure]).unwrap();
-    let lost = information.lost([&own, &mirrored]).unwrap().unwrap();
-    let change = information.change([own, again]).unwrap().unwrap();
+    let mirrored = experiment
+        .mirrored(std::slice::from_ref(&departure))
+        .unwrap();
+    let pair = experiment.pair(&[departure]).unwrap();
+    let lost = information.lost([&pair[0], &mirrored]).unwrap().unwrap();
+    let change = information.change(pair).unwrap().unwrap();
     let (nats, theory) = (
         information.nats(&change),
         0.5 * 400.0 * (bias / 0.1).powi(2),
@@ -181,13 +183,13 @@ fn bias_has_its_information(stage: &Stage<'_>, information: &Information) {
     assert!((lost / absorbed - 1.0).abs() < 0.15, "{lost} {absorbed}");
     // The gain of the actuator is what θ does; the bias is no gain.
     let gain = plain("actuator-gain", DeparturePlace::Actuator(0));
-    let gain = stage.changed(&gain, FIRST, information).unwrap().unwrap();
+    let gain = experiment.changed(&gain, FIRST).unwrap().unwrap();
     assert!(
         information.nats(&gain) < 0.05 * nats,
         "{}",
         information.nats(&gain)
     );
-    let same = stage.changed(&draft, FIRST, information).unwrap().unwrap();
+    let same = experiment.changed(&draft, FIRST).unwrap().unwrap();
     assert!(information.unexplained(&change, &same) < 0.01);
 }
 
@@ -283,9 +285,10 @@ fn records_are_like_a_measured_one() {
 /// A push on the upper tank and a bias of its pump are one departure: nothing of one remains beside the other.
 #[test]
 fn departures_that_are_alike_have_no_information_beside_each_other() {
-    on_stage(&tanks(250), &[0.6, 0.5, 0.55, 1.0], |stage, information| {
+    experiment(&tanks(250), &[0.6, 0.5, 0.55, 1.0], |experiment| {
+        let information = &experiment.information;
         let changed = |id, place| {
-            let change = stage.changed(&plain(id, place), 0.1, information);
+            let change = experiment.changed(&plain(id, place), 0.1);
             change.unwrap().unwrap()
         };
         let push = changed("constant-forcing", DeparturePlace::State(0));
@@ -323,13 +326,15 @@ impl StateSpace for Tank {
 #[test]
 fn what_a_distant_theta_absorbs_has_no_information() {
     let study = Study::new("tank", Tank, RecordPlan::levels(0.1, 300, 0.0, 1.0, 20)).unwrap();
-    on_stage(&study, &[0.49, 1.04], |stage, information| {
+    experiment(&study, &[0.49, 1.04], |experiment| {
         let gain = Departure {
             place: DeparturePlace::Actuator(0),
             law: DepartureLaw::Signal(SignalDeparture::Gain { factor: 2.35 }),
         };
-        let [own, _, mirrored] = stage.records(&[gain]).unwrap();
-        let lost = information.lost([&own, &mirrored]).unwrap().unwrap();
+        let mirrored = experiment.mirrored(std::slice::from_ref(&gain)).unwrap();
+        let [own, _] = experiment.pair(&[gain]).unwrap();
+        let lost = experiment.information.lost([&own, &mirrored]);
+        let lost = lost.unwrap().unwrap();
         assert!(lost < 1.0, "{lost}");
     });
 }
