@@ -1,6 +1,6 @@
 //! Two Kalman filters side by side: one for the states, one for θ.
 
-use super::numbers::BASELINE;
+use super::BASELINE;
 use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::FilterError;
 use crate::math::Stencil;

@@ -1,6 +1,6 @@
 //! Fitting the noise-free output.
 
-use super::numbers::BASELINE;
+use super::BASELINE;
 use crate::evaluate::EvaluateError;
 use crate::math::Stencil;
 use crate::record::Record;

@@ -11,8 +11,6 @@
 //! ```
 
 mod free_runs;
-mod invariant;
-mod method;
 mod monte_carlo;
 mod presets;
 mod run;
@@ -20,11 +18,11 @@ mod scenario;
 mod score;
 
 pub(crate) use free_runs::{AnswerRuns, MeanRuns};
-use invariant::{Invariant, Symmetry};
-pub(crate) use method::ScoredMethod;
 pub(crate) use monte_carlo::{MonteCarlo, Origin};
 pub use presets::{reference_projects, reference_studies};
 pub(crate) use run::BenchmarkRun;
+pub(crate) use run::ScoredMethod;
 pub(crate) use scenario::{Benchmark, Scenario};
 use scenario::{Published, TestPoint};
 pub(crate) use score::{Coverage, MethodScore, PointScore, Scores, score};
+use score::{Invariant, Symmetry};

@@ -1,8 +1,10 @@
-//! Settings of sealed trials.
+//! Settings of sealed trials, and the kinds of truth.
 
-use super::{Families, Kind};
+use super::Families;
 use crate::diagnose::Ablation;
 use crate::record::Record;
+use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Most trials of a folder; their keys are in memory.
 pub(crate) const MOST: usize = 1_000_000;
@@ -59,5 +61,125 @@ impl Default for TrialSettings {
             ablated: vec![],
             steadiness: 0,
         }
+    }
+}
+
+/// Kind of truth of a trial, which decides the right answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Kind {
+    /// Nothing, θ inside the prior: no structural gap.
+    None,
+    /// Nothing, θ outside the prior: no structural gap.
+    Outside,
+    /// A listed law: to be named.
+    Listed,
+    /// A listed law, its physics written otherwise: to be named.
+    Otherwise,
+    /// A random law: a structural gap, and none of the listed effects.
+    Random,
+    /// Two listed laws at different places: both to be accepted.
+    Pair,
+    /// θ outside the prior and a listed law: to be named.
+    Beside,
+}
+
+/// Names in calls and files, numbers of trials among twenty, right answers; in the order of the kinds.
+#[rustfmt::skip] // One row a kind.
+const TABLE: [(Kind, &str, usize, &str); 7] = [
+    (Kind::None, "none", 4, "no structural gap"),
+    (Kind::Outside, "outside", 3, "no structural gap; a parameter gap may be seen"),
+    (Kind::Listed, "listed", 4, NAMED),
+    (Kind::Otherwise, "otherwise", 2, NAMED),
+    (Kind::Random, "random", 4, "structural, none of the listed effects"),
+    (Kind::Pair, "pair", 1, "structural, both effects and nothing false accepted"),
+    (Kind::Beside, "beside", 2, NAMED),
+];
+const NAMED: &str = "structural, the true effect and nothing false accepted";
+
+impl Kind {
+    /// All, in the order of tables.
+    pub const ALL: [Self; 7] = [
+        Self::None,
+        Self::Outside,
+        Self::Listed,
+        Self::Otherwise,
+        Self::Random,
+        Self::Pair,
+        Self::Beside,
+    ];
+
+    /// As in calls and files.
+    pub fn id(self) -> &'static str {
+        TABLE[self as usize].1
+    }
+
+    /// The kind with this id.
+    pub fn named(id: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.id() == id)
+    }
+
+    /// The right answer, in words.
+    pub(crate) fn rule(self) -> &'static str {
+        TABLE[self as usize].3
+    }
+
+    /// Returns true if no θ explains the record.
+    pub fn is_structural(self) -> bool {
+        !matches!(self, Self::None | Self::Outside)
+    }
+
+    /// Returns true if θ lies outside the prior.
+    pub(super) fn is_outside(self) -> bool {
+        matches!(self, Self::Outside | Self::Beside)
+    }
+
+    /// Number of trials of this kind among twenty.
+    fn weight(self) -> usize {
+        TABLE[self as usize].2
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.id())
+    }
+}
+
+/// Assigns kinds to trials in the proportions of the weights and in random order: `pick` gives numbers below its argument.
+pub(super) fn assign_kinds(
+    kinds: &[Kind],
+    trials: usize,
+    mut pick: impl FnMut(usize) -> usize,
+) -> Vec<Kind> {
+    // Round after round, so that few trials have many kinds.
+    let most = kinds.iter().map(|kind| kind.weight()).max().unwrap_or(0);
+    let pack: Vec<Kind> = (0..most)
+        .flat_map(|round| kinds.iter().filter(move |kind| kind.weight() > round))
+        .copied()
+        .collect();
+    let mut assigned: Vec<Kind> = pack.into_iter().cycle().take(trials).collect();
+    for i in (1..assigned.len()).rev() {
+        assigned.swap(i, pick(i + 1));
+    }
+    assigned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twenty_trials_have_every_kind_by_its_weight() {
+        let assigned = assign_kinds(&Kind::ALL, 40, |n| n / 2);
+        for kind in Kind::ALL {
+            let count = assigned.iter().filter(|k| **k == kind).count();
+            assert_eq!(count, 2 * kind.weight(), "{kind}");
+            assert_eq!(Kind::named(kind.id()), Some(kind));
+            assert_eq!(TABLE[kind as usize].0, kind);
+        }
+        assert_eq!(assign_kinds(&[Kind::Pair], 3, |_| 0), [Kind::Pair; 3]);
+        assert!(assign_kinds(&[], 3, |_| 0).is_empty());
     }
 }

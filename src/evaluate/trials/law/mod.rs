@@ -3,22 +3,16 @@
 //! | file | laws |
 //! |---|---|
 //! | `signal.rs` | distortions of a signal on its way from a sensor or to an actuator |
-//! | `force.rs` | terms in the rate of a state |
-//! | `parameter.rs` | changes of a parameter over time |
-//! | `random.rs`, `tree.rs`, `waves.rs` | functions that are drawn anew for each trial |
-//! | `families.rs` | their halves: one to choose constants with, one for reports |
+//! | `force.rs` | terms in the rate of a state, changes of a parameter over time |
+//! | `random.rs`, `functions.rs` | functions that are drawn anew for each trial, and the halves of their families |
 
-mod families;
 mod force;
-mod parameter;
+mod functions;
 mod random;
 mod signal;
-mod tree;
-mod waves;
 
-pub use families::Families;
-pub(super) use force::{ForceDeparture, Wave};
-pub(super) use parameter::ParameterDeparture;
+pub(super) use force::{ForceDeparture, ParameterDeparture, Wave};
+pub use random::Families;
 pub(super) use random::{Argument, LawFamily, LawVariable, RandomLaw};
 pub(super) use signal::SignalDeparture;
 

@@ -1,11 +1,11 @@
 //! Laws that nobody listed: a new function for each trial.
 
-use super::Moment;
-use super::tree::Tree;
-use super::waves::Waves;
-use crate::twin::Source;
+use super::functions::{Tree, Waves};
+use super::{DeparturePlace, Moment};
+use crate::twin::{Noise, Source};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::str::FromStr;
 
 /// Source of the functions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -218,10 +218,67 @@ impl RandomLaw {
     }
 }
 
+/// Seed of the split. Another one makes closed families open.
+const SPLIT: u64 = 20_261_121;
+
+/// Families of random laws that a call draws from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Families {
+    /// The half that constants may be chosen on.
+    Open,
+    /// The half for reports.
+    Closed,
+    /// Both halves.
+    #[default]
+    All,
+}
+
+impl fmt::Display for Families {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Open => "open",
+            Self::Closed => "closed",
+            Self::All => "all",
+        })
+    }
+}
+
+impl FromStr for Families {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        [Self::Open, Self::Closed, Self::All]
+            .into_iter()
+            .find(|families| families.to_string() == text)
+            .ok_or_else(|| format!("{text} is none of open, closed, all"))
+    }
+}
+
+impl Families {
+    /// Families of this half at a place. Each kind of place has half of them in either half.
+    pub(in crate::evaluate::trials) fn at(self, place: DeparturePlace) -> Vec<LawFamily> {
+        let mut all: Vec<(f64, LawFamily)> = (LawFamily::all().into_iter())
+            .map(|family| {
+                let name = format!("{family}/{}", place.kind().name());
+                let lot = Noise::new(SPLIT, "families", 0).source(&name).uniform();
+                (lot, family)
+            })
+            .collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let half = all.len() / 2;
+        let all = all.into_iter().map(|(_, family)| family);
+        match self {
+            Self::Open => all.take(half).collect(),
+            Self::Closed => all.skip(half).collect(),
+            Self::All => all.collect(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::Noise;
 
     #[test]
     fn every_family_has_the_size_that_it_is_given() {
@@ -260,5 +317,25 @@ mod tests {
             let text = serde_json::to_string(&law).unwrap();
             assert_eq!(serde_json::from_str::<RandomLaw>(&text).unwrap(), law);
         }
+    }
+
+    #[test]
+    fn halves_share_no_family_and_leave_none_out() {
+        for place in [
+            DeparturePlace::State(0),
+            DeparturePlace::Sensor(1),
+            DeparturePlace::Actuator(0),
+            DeparturePlace::Parameter(2),
+        ] {
+            let (open, closed) = (Families::Open.at(place), Families::Closed.at(place));
+            assert_eq!((open.len(), closed.len()), (4, 4));
+            assert!(open.iter().all(|family| !closed.contains(family)));
+        }
+        assert_eq!(
+            Families::Open.at(DeparturePlace::State(0)),
+            Families::Open.at(DeparturePlace::State(5))
+        );
+        assert!("odd".parse::<Families>().is_err());
+        assert_eq!("closed".parse::<Families>(), Ok(Families::Closed));
     }
 }

@@ -1,8 +1,6 @@
 //! Scores of all trials: lists of statistics over rows.
 
-mod baselines;
 mod breakdown;
-mod probabilities;
 mod statistics;
 
 pub(crate) use breakdown::{Breakdown, BreakdownLine};
@@ -58,14 +56,12 @@ impl Scorecard {
             words: f.words,
             value: (f.value)(&rows),
         };
-        let mut breakdowns = breakdown::breakdowns(&rows);
-        breakdowns.push(baselines::baselines(&rows));
         Self {
             trials: rows.len(),
             setup,
             scores: SCORES.iter().map(score).collect(),
             figures: FIGURES.iter().map(figure).collect(),
-            breakdowns,
+            breakdowns: breakdown::breakdowns(&rows),
             rows,
         }
     }

@@ -8,11 +8,13 @@
 //! of both leave much.
 
 use super::NearestEffect;
-use super::listed::Listed;
 use super::sizing::{Experiment, FIRST, Sized};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::Draft;
+use crate::evaluate::trials::law::DeparturePlace;
 use crate::evaluate::trials::listed::{ListedLaw, Sign, Variant};
+use crate::evaluate::trials::places::TwinPlaces;
+use crate::study::Study;
 
 /// An effect is a right answer if it leaves less than this share of the information, and less than this in nats.
 const IMITATES: (f64, f64) = (0.02, 1.0);
@@ -206,3 +208,30 @@ impl Comparison<'_> {
 
 #[cfg(test)]
 mod tests;
+
+/// An effect of the study's library, as a law of the world.
+pub(super) struct Listed {
+    pub key: String,
+    pub id: String,
+    pub place: DeparturePlace,
+    /// The other state of a law between two.
+    pub other: Option<usize>,
+}
+
+impl Listed {
+    /// Returns the effects that the study may name and that worlds can have.
+    pub fn all(study: &Study, places: &TwinPlaces) -> Vec<Self> {
+        let state = |name: &str| places.states.iter().position(|s| s == name);
+        (study.candidates().iter())
+            .filter(|effect| ListedLaw::named(effect.id()).is_some())
+            .filter_map(|effect| {
+                Some(Self {
+                    key: effect.key().to_string(),
+                    id: effect.id().into(),
+                    place: places.find(effect.id(), effect.target())?,
+                    other: effect.other().and_then(state),
+                })
+            })
+            .collect()
+    }
+}

@@ -3,18 +3,14 @@
 //! | file | does |
 //! |---|---|
 //! | `prior.rs` | draws θ and the conditions of a record |
-//! | `listed.rs` | lists the effects that worlds can have |
 //! | `sizing.rs` | finds the size at which a departure has the information that it is to have |
-//! | `imitators.rs` | finds the listed effects that a record cannot tell from a departure |
-//! | `reject.rs` | names the reasons for which a draw is given up |
+//! | `imitators.rs` | finds the listed effects, of those that worlds can have, that a record cannot tell from a departure |
 //! | `sampler.rs` | draws a whole truth |
 
 #[cfg(test)]
 mod fixture;
 mod imitators;
-mod listed;
 mod prior;
-mod reject;
 mod sampler;
 mod sizing;
 
@@ -23,6 +19,7 @@ pub(super) use sampler::{Extra, TruthSampler};
 use super::Kind;
 use super::law::Departure;
 use super::world::Conditions;
+use crate::evaluate::EvaluateError;
 use serde::{Deserialize, Serialize};
 
 /// A listed effect that is no right answer.
@@ -66,4 +63,48 @@ pub(crate) struct Truth {
     pub step: f64,
     /// Draws that were given up before this one.
     pub redraws: u64,
+}
+
+/// Reason for which a draw was given up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Reject {
+    Diverged,
+    Still,
+    NoFilter,
+    NoLaw,
+    TooWeak,
+    TooAlike,
+}
+
+impl Reject {
+    /// Returns what became of the draw, after its count.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Diverged => "diverged",
+            Self::Still => "had an output that never moves",
+            Self::NoFilter => "could not be filtered",
+            Self::NoLaw => "had no law that could be made",
+            Self::TooWeak => "did not show in the outputs, or diverged before they did",
+            Self::TooAlike => "had two departures of which one explains or hides the other",
+        }
+    }
+}
+
+/// End of a draw without a truth: it was given up, or nothing can be drawn any more.
+#[derive(Debug)]
+pub(super) enum DrawEnd {
+    Rejected(Reject),
+    Failed(EvaluateError),
+}
+
+impl From<Reject> for DrawEnd {
+    fn from(reject: Reject) -> Self {
+        Self::Rejected(reject)
+    }
+}
+
+impl<E: Into<EvaluateError>> From<E> for DrawEnd {
+    fn from(error: E) -> Self {
+        Self::Failed(error.into())
+    }
 }

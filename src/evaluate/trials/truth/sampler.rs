@@ -1,17 +1,17 @@
 //! Draws truths and their records.
 
 use super::Truth;
+use super::imitators::Listed;
 use super::imitators::{Imitators, rival};
-use super::listed::Listed;
 use super::prior::{conditions, has_room, nuisances, theta};
-use super::reject::{DrawEnd, Reject};
 use super::sizing::Experiment;
+use super::{DrawEnd, Reject};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::{Draft, index};
 use crate::evaluate::trials::listed::LawForm;
+use crate::evaluate::trials::places::Structure;
 use crate::evaluate::trials::places::TwinPlaces;
 use crate::evaluate::trials::scene::Scene;
-use crate::evaluate::trials::structure::Structure;
 use crate::evaluate::trials::world::{Conditions, RecordNoise, System, World};
 use crate::evaluate::trials::{Families, Kind};
 use crate::record::{Drive, Record, Signal};

@@ -1,6 +1,6 @@
 //! The size at which a departure has the expected information that it is to have.
 
-use super::reject::{DrawEnd, Reject};
+use super::{DrawEnd, Reject};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::information::{Information, InnovationChange};
