@@ -1,7 +1,7 @@
 //! Several studies on one record: a table and an overlay.
 
 use super::chart::Style;
-use super::digits::{short, unit_suffix};
+use super::digits::{short, with_unit};
 use super::document::Column::{Number, Text};
 use super::document::{Block, Document};
 use super::record::{RecordPicture, Run, times};
@@ -100,11 +100,7 @@ pub(crate) fn compare_document(all: &[Compared], what: &str) -> Document {
 }
 
 fn errors(all: &[OutputErrors], of: impl Fn(&OutputErrors) -> Option<f64>) -> String {
-    let one = |e: &OutputErrors| {
-        of(e).map_or("diverges".into(), |value| {
-            format!("{}{}", short(value), unit_suffix(&e.unit))
-        })
-    };
+    let one = |e: &OutputErrors| of(e).map_or("diverges".into(), |value| with_unit(value, &e.unit));
     all.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 

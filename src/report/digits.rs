@@ -98,20 +98,41 @@ pub(super) fn chance(p: f64) -> String {
     }
 }
 
+/// A value in the digits that its standard error supports, and that error.
+pub(super) fn with_error(value: f64, std_error: f64) -> [String; 2] {
+    let digits = Digits::supported(value, std_error);
+    [digits.write(value), error(std_error)]
+}
+
+/// `3.00 V`: three significant digits and the unit, where there is one.
+pub(super) fn with_unit(value: f64, unit: &str) -> String {
+    short(value) + &unit_suffix(unit)
+}
+
 /// `y in V`.
 pub(super) fn named(quantity: &Quantity) -> String {
-    match unit_suffix(&quantity.unit) {
-        unit if unit.is_empty() => quantity.name.clone(),
-        unit => format!("{} in{unit}", quantity.name),
+    format!("{}{}", quantity.name, in_unit(&quantity.unit))
+}
+
+/// " in V", or nothing where a quantity has no unit.
+pub(super) fn in_unit(unit: &str) -> String {
+    match own_unit(unit) {
+        "" => String::new(),
+        unit => format!(" in {unit}"),
     }
 }
 
 /// " V", or nothing where a quantity has no unit.
 pub(super) fn unit_suffix(unit: &str) -> String {
-    match unit {
-        "" | "-" => String::new(),
+    match own_unit(unit) {
+        "" => String::new(),
         unit => format!(" {unit}"),
     }
+}
+
+/// The unit for a column of its own; a dash is none.
+pub(super) fn own_unit(unit: &str) -> &str {
+    if unit == "-" { "" } else { unit }
 }
 
 /// The power of ten of the leading digit; 0 for zero.

@@ -1,7 +1,7 @@
 //! A fit as JSON and as a document.
 
-use super::chart::Pairs;
-use super::digits::{self, Digits, percent, short, unit_suffix};
+use super::chart::pair_plot;
+use super::digits::{own_unit, percent, short, unit_suffix, with_error, with_unit};
 use super::document::Column::{Number, Text};
 use super::document::{Block, Document, Picture, Section};
 use super::parameters::{ParameterRow, priors, values};
@@ -152,15 +152,14 @@ fn headline(fit: &Fit) -> String {
 
 /// Fitted noise levels and starts.
 fn levels(fit: &Fit) -> Vec<Block> {
-    let unit = |unit: &str| unit_suffix(unit).trim_start().to_owned();
     let noise = |level: &FittedNoise| {
-        let digits = Digits::supported(level.value, level.std_error);
+        let [value, error] = with_error(level.value, level.std_error);
         vec![
             level.name.clone(),
-            digits.write(level.value),
-            digits::error(level.std_error),
+            value,
+            error,
             level.declared.map_or(String::new(), short),
-            unit(&level.unit),
+            own_unit(&level.unit).to_owned(),
             level.at_bound.map_or("", |_| "at its bound").to_owned(),
         ]
     };
@@ -170,13 +169,9 @@ fn levels(fit: &Fit) -> Vec<Block> {
             true => format!(" (record {})", start.record),
             false => String::new(),
         };
-        let digits = Digits::supported(start.value, start.std_error);
-        vec![
-            start.name.clone() + &record,
-            digits.write(start.value),
-            digits::error(start.std_error),
-            unit(&start.unit),
-        ]
+        let [value, error] = with_error(start.value, start.std_error);
+        let unit = own_unit(&start.unit).to_owned();
+        vec![start.name.clone() + &record, value, error, unit]
     };
     let [value, error] = [("value", Number), ("± std error", Number)];
     let head = [
@@ -187,38 +182,28 @@ fn levels(fit: &Fit) -> Vec<Block> {
         ("unit", Text),
         ("", Text),
     ];
-    let mut all = vec![];
-    if !fit.noise.is_empty() {
-        all.push(Block::table(
-            "",
-            &head,
-            fit.noise.iter().map(noise).collect(),
-        ));
-    }
-    if !fit.starts.is_empty() {
-        let head = [("start of", Text), value, error, ("unit", Text)];
-        all.push(Block::table(
-            "",
-            &head,
-            fit.starts.iter().map(start).collect(),
-        ));
-    }
-    all
+    let head_of_starts = [("start of", Text), value, error, ("unit", Text)];
+    let tables: [(&[_], Vec<_>); 2] = [
+        (&head, fit.noise.iter().map(noise).collect()),
+        (&head_of_starts, fit.starts.iter().map(start).collect()),
+    ];
+    let filled = tables.into_iter().filter(|(_, rows)| !rows.is_empty());
+    filled
+        .map(|(head, rows)| Block::table("", head, rows))
+        .collect()
 }
 
 /// Errors of each output, convergence and evidence.
 fn quality(fit: &Fit) -> Vec<Block> {
     let mut all: Vec<Block> = (fit.errors.iter())
         .map(|error| {
-            let unit = unit_suffix(&error.unit);
-            let free = error
-                .free_run
-                .map_or("diverges".into(), |rmse| format!("{}{unit}", short(rmse)));
+            let free =
+                (error.free_run).map_or("diverges".into(), |rmse| with_unit(rmse, &error.unit));
             Block::Paragraph(format!(
-                "{}: one-step error {}, free run {free}; the record varies by {}{unit}.",
+                "{}: one-step error {}, free run {free}; the record varies by {}.",
                 error.name,
                 short(error.one_step),
-                short(error.deviation),
+                with_unit(error.deviation, &error.unit),
             ))
         })
         .collect();
@@ -281,19 +266,14 @@ pub(crate) fn posterior_svg(study: &Study, posterior: &Posterior) -> String {
         1 => "1 mode".to_owned(),
         modes => format!("{modes} modes, each in its colour"),
     };
-    Pairs {
-        title: format!(
-            "{}: {} posterior draws",
-            study.name(),
-            posterior.values.nrows()
-        ),
-        description: format!(
-            "Histograms of posterior draws and each parameter against each; {modes}"
-        ),
-        columns: columns.collect(),
-        groups: posterior.modes.iter().map(|mode| mode - 1).collect(),
-    }
-    .svg()
+    let (name, draws) = (study.name(), posterior.values.nrows());
+    let groups: Vec<usize> = posterior.modes.iter().map(|mode| mode - 1).collect();
+    pair_plot(
+        &format!("{name}: {draws} posterior draws"),
+        &format!("Histograms of posterior draws and each parameter against each; {modes}"),
+        &columns.collect::<Vec<_>>(),
+        &groups,
+    )
 }
 
 /// The line of a fitted value in the table.

@@ -141,7 +141,7 @@ pub(super) fn values(caption: &str, level: f64, rows: &[ParameterRow]) -> Block 
             digits.write(row.value),
             digits::error(row.std_error),
             format!("[{low}, {high}]"),
-            digits::unit_suffix(&row.unit).trim_start().to_owned(),
+            digits::own_unit(&row.unit).to_owned(),
             row.remark(),
         ]
     };

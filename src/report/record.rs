@@ -1,7 +1,7 @@
 //! Records with runs of a twin over them, and what is left below: the picture of every result, and the table behind it.
 
-use super::chart::{Chart, Mark, Panel, Series, Span, Style, roomy};
-use super::digits::{named, short, unit_suffix};
+use super::chart::{Line, Panel, Span, Style, TimeMark, chart, roomy};
+use super::digits::{in_unit, named, short, with_unit};
 use crate::record::{Quantity, Record, Signal};
 use crate::study::Study;
 
@@ -20,7 +20,7 @@ pub(super) struct RecordPicture<'a> {
     pub runs: Vec<Run<'a>>,
     /// Stretches of time of an output.
     pub spans: &'a dyn Fn(&str) -> Vec<Span>,
-    pub marks: Vec<Mark>,
+    pub marks: Vec<TimeMark>,
 }
 
 impl RecordPicture<'_> {
@@ -35,36 +35,31 @@ impl RecordPicture<'_> {
                 format!("{}: {}", output.name, all.join(", "))
             })
             .collect();
-        let chart = Chart {
-            title: self.title.clone(),
-            description: format!(
-                "Measured outputs over {} s and free runs of the twin; below each, record minus twin. {}.",
-                short(self.times.last().copied().unwrap_or(0.0)),
-                errors.join("; "),
-            ),
-            x: "t in s".into(),
-            panels: outputs()
-                .flat_map(|(j, output)| self.panels(j, output))
-                .collect(),
-        };
-        chart.svg()
+        let description = format!(
+            "Measured outputs over {} s and free runs of the twin; below each, record minus twin. {}.",
+            short(self.times.last().copied().unwrap_or(0.0)),
+            errors.join("; "),
+        );
+        let panels = outputs().flat_map(|(j, output)| self.panels(j, output));
+        let axis = ("t in s".to_owned(), panels.collect());
+        chart(&self.title, &description, &[axis])
     }
 
     fn panels(&self, j: usize, output: &Quantity) -> Vec<Panel> {
         let timed = |values: &Signal| self.times.iter().copied().zip(values.column(j).to_vec());
         let shown = roomy(self.measured.column(j).iter().copied());
-        let mut over = vec![Series::new("measured", Style::RECORD, timed(self.measured))];
+        let mut over = vec![Line::new("measured", Style::RECORD, timed(self.measured))];
         let mut left = vec![];
         for run in &self.runs {
             let label = format!("{}, {}", run.0, self.rmse(run, j, output));
-            over.push(Series::new(&label, run.1, timed(run.2)).within(shown.clone()));
+            over.push(Line::new(&label, run.1, timed(run.2)).within(shown.clone()));
             let residual = self.times.iter().copied().zip(self.residual(run, j));
-            left.push(Series::new("", run.1, residual));
+            left.push(Line::new("", run.1, residual));
         }
         let above = Panel::new(&named(output), over)
             .spans((self.spans)(&output.name))
             .marks(self.marks.clone());
-        let label = format!("{}: record − twin{}", output.name, in_unit(output));
+        let label = format!("{}: record − twin{}", output.name, in_unit(&output.unit));
         match left.is_empty() {
             true => vec![above],
             false => vec![above, Panel::new(&label, left).height(RESIDUAL_HEIGHT)],
@@ -82,14 +77,7 @@ impl RecordPicture<'_> {
         left.retain(|r| r.is_finite());
         let squares: f64 = left.iter().map(|r| r * r).sum();
         let rmse = (squares / left.len().max(1) as f64).sqrt();
-        format!("RMSE {}{}", short(rmse), unit_suffix(&output.unit))
-    }
-}
-
-fn in_unit(quantity: &Quantity) -> String {
-    match unit_suffix(&quantity.unit) {
-        unit if unit.is_empty() => unit,
-        unit => format!(" in{unit}"),
+        format!("RMSE {}", with_unit(rmse, &output.unit))
     }
 }
 

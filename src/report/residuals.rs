@@ -1,6 +1,6 @@
 //! Residuals as people know them: auto-correlation, cross-correlation with the inputs, quantiles.
 
-use super::chart::{Area, Chart, Curves, Dot, Dots, Panel, Series, Style};
+use super::chart::{Area, Dot, Dots, Line, Panel, Style, chart};
 use super::document::Block;
 use crate::record::Signal;
 use crate::study::Study;
@@ -109,7 +109,7 @@ fn panel(label: &str, at: impl Fn(usize) -> f64, lags: [usize; 2], count: Option
         }
     });
     let ends = [lags[0] as f64 - 0.5, lags[1] as f64 + 0.5];
-    let zero = Series::new("", Style::ZERO, ends.map(|x| (x, 0.0)));
+    let zero = Line::new("", Style::ZERO, ends.map(|x| (x, 0.0)));
     let panel = Panel::new(label, vec![zero]).height(HEIGHT);
     let panel = match count {
         None => panel,
@@ -141,13 +141,9 @@ fn auto_correlations(names: &[String], is_white: bool, all: &[Left<'_>]) -> Stri
         let label = format!("correlation of {name}");
         panel(&label, at, [1, LAGS], is_white.then(|| count(all, j)))
     });
-    Chart {
-        title: "Autocorrelation of residuals".into(),
-        description: format!("Auto-correlations of the residuals at lags 1 to {LAGS}."),
-        x: "lag in samples".into(),
-        panels: panels.collect(),
-    }
-    .svg()
+    let axis = ("lag in samples".to_owned(), panels.collect());
+    let description = format!("Auto-correlations of the residuals at lags 1 to {LAGS}.");
+    chart("Autocorrelation of residuals", &description, &[axis])
 }
 
 /// Cross-correlations of the residuals of each output with each input before; `None` without inputs.
@@ -171,16 +167,16 @@ fn cross_correlations(
     if panels.is_empty() {
         return None;
     }
-    let chart = Chart {
-        title: "Correlation of residuals with inputs".into(),
-        description: format!(
-            "Cross-correlations of residuals with inputs at lags 0 to {LAGS}, {} panels.",
-            panels.len()
-        ),
-        x: "lag in samples".into(),
-        panels,
-    };
-    Some(chart.svg())
+    let count = panels.len();
+    let description =
+        format!("Cross-correlations of residuals with inputs at lags 0 to {LAGS}, {count} panels.");
+    let axis = ("lag in samples".to_owned(), panels);
+    let svg = chart(
+        "Correlation of residuals with inputs",
+        &description,
+        &[axis],
+    );
+    Some(svg)
 }
 
 /// Quantiles of the residuals of each output against normal ones.
@@ -199,20 +195,15 @@ fn quantiles(names: &[String], all: &[Left<'_>]) -> String {
         let ends = [points.first(), points.last()].into_iter().flatten();
         let line: Vec<(f64, f64)> = ends.map(|(x, _)| (*x, x * size)).collect();
         let lines = vec![
-            Series::new("normal", Style::ZERO, line),
-            Series::new("residuals", Style::AFTER, points),
+            Line::new("normal", Style::ZERO, line),
+            Line::new("residuals", Style::AFTER, points),
         ];
-        (
-            "normal quantile".to_owned(),
-            Panel::new(&format!("residual of {name}"), lines),
-        )
+        let panel = Panel::new(&format!("residual of {name}"), lines);
+        ("normal quantile".to_owned(), vec![panel])
     });
-    Curves {
-        title: "Quantiles of residuals".into(),
-        description: "Sorted residuals against quantiles of a normal distribution.".into(),
-        panels: panels.collect(),
-    }
-    .svg()
+    let description = "Sorted residuals against quantiles of a normal distribution.";
+    let axes: Vec<_> = panels.collect();
+    chart("Quantiles of residuals", description, &axes)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Units of everything that a diagnosis names, as far as the twin tells them.
 
-use super::digits::{named, short, unit_suffix};
+use super::digits::{named, with_unit};
 use crate::diagnose::EffectFit;
 use crate::effect::{Effect, channel, magnitude_unit};
 use crate::record::{Quantity, Signals};
@@ -127,10 +127,8 @@ impl Units {
         let finite = fit.magnitudes.iter().filter(|(_, value)| value.is_finite());
         let all: Vec<String> = finite
             .map(|(name, value)| {
-                let unit = self
-                    .of_magnitude(&fit.id, &fit.target, name)
-                    .unwrap_or_default();
-                format!("{name} {}{}", short(*value), unit_suffix(&unit))
+                let unit = self.of_magnitude(&fit.id, &fit.target, name);
+                format!("{name} {}", with_unit(*value, &unit.unwrap_or_default()))
             })
             .collect();
         all.join(", ")

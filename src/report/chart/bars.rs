@@ -13,17 +13,6 @@ const NAMES: f64 = 0.46 * ROOM;
 /// Room for one tick of a scale.
 const TICK: f64 = 64.0;
 
-/// Groups of bars. Scales begin at zero.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BarChart {
-    /// Heading, also for screen readers.
-    pub title: String,
-    /// Description for screen readers.
-    pub description: String,
-    /// Ordered from top to bottom.
-    pub groups: Vec<BarGroup>,
-}
-
 /// Bars under a heading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BarGroup {
@@ -95,51 +84,49 @@ impl Bar {
     }
 }
 
-impl BarChart {
-    /// The picture, to stand in a file or inside a page.
-    pub fn svg(&self) -> String {
-        let bars = || self.groups.iter().flat_map(|group| &group.bars);
-        let widest = |needs: fn(&Bar) -> f64| bars().map(needs).fold(0.0, f64::max);
-        let names = widest(|bar| width(&bar.label, TEXT * BOLD)).min(NAMES);
-        let notes = widest(|bar| width(&bar.note, TEXT));
-        let left = EDGE + names + GAP;
-        let right = (WIDTH - EDGE - notes - GAP).max(left + ROW);
-        let shared = (self.groups.iter())
-            .filter(|group| group.full.is_none())
-            .flat_map(|group| &group.bars)
-            .map(|bar| bar.value)
-            .filter(|value| value.is_finite())
-            .fold(0.0, f64::max);
-        let (mut canvas, top) = Canvas::new(&self.title, &self.description);
-        let mut y = top + 4.0;
-        for (i, group) in self.groups.iter().enumerate() {
-            if !group.label.is_empty() {
-                y += LINE;
-                let label = clipped(&group.label, TEXT * BOLD, ROOM);
-                canvas.text((EDGE, y), "start", true, &label);
-                y += 4.0;
-            }
-            let scale = Scale {
-                left,
-                right,
-                full: group.full.unwrap_or(shared),
-                per_cent: group.per_cent,
-            };
-            let bottom = y + ROW * group.bars.len() as f64;
-            for (x, _) in scale.ticks() {
-                canvas.vertical(x, (y, bottom), GRID);
-            }
-            for bar in &group.bars {
-                bar.draw(&mut canvas, &scale, names, y);
-                y += ROW;
-            }
-            let next = self.groups.get(i + 1);
-            if next.is_none_or(|next| (next.full, next.per_cent) != (group.full, group.per_cent)) {
-                y = scale.draw_labels(&mut canvas, bottom);
-            }
+/// Groups of bars from top to bottom. Scales begin at zero.
+pub fn bar_chart(title: &str, description: &str, groups: &[BarGroup]) -> String {
+    let bars = || groups.iter().flat_map(|group| &group.bars);
+    let widest = |needs: fn(&Bar) -> f64| bars().map(needs).fold(0.0, f64::max);
+    let names = widest(|bar| width(&bar.label, TEXT * BOLD)).min(NAMES);
+    let notes = widest(|bar| width(&bar.note, TEXT));
+    let left = EDGE + names + GAP;
+    let right = (WIDTH - EDGE - notes - GAP).max(left + ROW);
+    let shared = (groups.iter())
+        .filter(|group| group.full.is_none())
+        .flat_map(|group| &group.bars)
+        .map(|bar| bar.value)
+        .filter(|value| value.is_finite())
+        .fold(0.0, f64::max);
+    let (mut canvas, top) = Canvas::new(title, description);
+    let mut y = top + 4.0;
+    for (i, group) in groups.iter().enumerate() {
+        if !group.label.is_empty() {
+            y += LINE;
+            let label = clipped(&group.label, TEXT * BOLD, ROOM);
+            canvas.text((EDGE, y), "start", true, &label);
+            y += 4.0;
         }
-        canvas.svg(y + EDGE)
+        let scale = Scale {
+            left,
+            right,
+            full: group.full.unwrap_or(shared),
+            per_cent: group.per_cent,
+        };
+        let bottom = y + ROW * group.bars.len() as f64;
+        for (x, _) in scale.ticks() {
+            canvas.vertical(x, (y, bottom), GRID);
+        }
+        for bar in &group.bars {
+            bar.draw(&mut canvas, &scale, names, y);
+            y += ROW;
+        }
+        let next = groups.get(i + 1);
+        if next.is_none_or(|next| (next.full, next.per_cent) != (group.full, group.per_cent)) {
+            y = scale.draw_labels(&mut canvas, bottom);
+        }
     }
+    canvas.svg(y + EDGE)
 }
 
 /// Scale from values to positions; it begins at zero.

@@ -1,8 +1,8 @@
-//! Heat maps: rows of stretches along one x axis.
+//! Heat maps: rows of stretches of time.
 
 use super::axis::{Across, Ticks, padded};
 use super::canvas::{AXIS, BOLD, Canvas, EDGE, LINE, ROOM, TEXT, WIDTH, clipped, width};
-use super::panel::{Mark, Span};
+use super::panel::{Span, TimeMark};
 
 /// Height of a row and of the cells inside it.
 const ROW: f64 = 30.0;
@@ -11,19 +11,6 @@ const CELL: f64 = 26.0;
 const GAP: f64 = 8.0;
 /// Most room for names.
 const NAMES: f64 = 0.34 * ROOM;
-
-/// Groups of rows above each other along one x axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HeatMap {
-    /// Heading, also for screen readers.
-    pub title: String,
-    /// Description for screen readers.
-    pub description: String,
-    /// Quantity and unit of the x axis.
-    pub x: String,
-    /// Ordered from top to bottom.
-    pub groups: Vec<HeatGroup>,
-}
 
 /// Rows under a heading.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,39 +29,37 @@ pub struct HeatRow {
     /// Ordered from left to right.
     pub cells: Vec<Span>,
     /// A place on the x axis.
-    pub mark: Option<Mark>,
+    pub mark: Option<TimeMark>,
 }
 
-impl HeatMap {
-    /// The picture, to stand in a file or inside a page.
-    pub fn svg(&self) -> String {
-        let rows = || self.groups.iter().flat_map(|group| &group.rows);
-        let ends = (rows().flat_map(|row| &row.cells)).flat_map(|cell| [cell.from, cell.to]);
-        let range = padded(ends, 0.0);
-        let ticks = Ticks::new(range, 5);
-        let names = (rows().map(|row| width(&row.label, TEXT))).fold(0.0, f64::max);
-        let across = Across {
-            range,
-            left: EDGE + names.min(NAMES) + GAP,
-            right: WIDTH - EDGE.max(ticks.widest() / 2.0 + 4.0),
-            ticks,
-        };
-        let (mut canvas, top) = Canvas::new(&self.title, &self.description);
-        let mut y = top + 4.0;
-        for group in &self.groups {
-            y = group.draw(&mut canvas, &across, y);
-        }
-        let (left, right) = (across.left, across.right);
-        canvas.horizontal((left, right), y, AXIS);
-        for (value, label) in across.ticks.labelled() {
-            let x = across.x(value);
-            canvas.vertical(x, (y, y + 4.0), AXIS);
-            canvas.text((x, y + LINE - 1.0), "middle", false, &label);
-        }
-        let at = (0.5 * (left + right), y + 2.0 * LINE);
-        canvas.text(at, "middle", false, &clipped(&self.x, TEXT, ROOM));
-        canvas.svg(y + 2.0 * LINE + EDGE)
+/// Groups of rows from top to bottom, along one axis of time.
+pub fn heat_map(title: &str, description: &str, groups: &[HeatGroup]) -> String {
+    let rows = || groups.iter().flat_map(|group| &group.rows);
+    let ends = (rows().flat_map(|row| &row.cells)).flat_map(|cell| [cell.from, cell.to]);
+    let range = padded(ends, 0.0);
+    let ticks = Ticks::new(range, 5);
+    let names = (rows().map(|row| width(&row.label, TEXT))).fold(0.0, f64::max);
+    let across = Across {
+        range,
+        left: EDGE + names.min(NAMES) + GAP,
+        right: WIDTH - EDGE.max(ticks.widest() / 2.0 + 4.0),
+        ticks,
+    };
+    let (mut canvas, top) = Canvas::new(title, description);
+    let mut y = top + 4.0;
+    for group in groups {
+        y = group.draw(&mut canvas, &across, y);
     }
+    let (left, right) = (across.left, across.right);
+    canvas.horizontal((left, right), y, AXIS);
+    for (value, label) in across.ticks.labelled() {
+        let x = across.x(value);
+        canvas.vertical(x, (y, y + 4.0), AXIS);
+        canvas.text((x, y + LINE - 1.0), "middle", false, &label);
+    }
+    let at = (0.5 * (left + right), y + 2.0 * LINE);
+    canvas.text(at, "middle", false, &"t in s");
+    canvas.svg(y + 2.0 * LINE + EDGE)
 }
 
 impl HeatGroup {

@@ -1,8 +1,8 @@
-//! Line charts: panels above each other along one x axis, or each along its own.
+//! Line charts: panels above each other along x axes.
 
 use super::axis::{Across, Ticks, padded};
 use super::canvas::{AXIS, BOLD, Canvas, EDGE, GRID, LINE, ROOM, TEXT, WIDTH, clipped, width};
-use super::panel::{Area, Dots, Panel, Series, Style};
+use super::panel::{Area, Dots, Line, Panel, Style};
 use std::fmt::Write;
 
 /// Points of all lines together: keeps a file under 300 KiB.
@@ -21,48 +21,13 @@ const BAND: &str = r##"fill="#0072b2" fill-opacity="0.2""##;
 const POINT: &str = r##"fill="#0072b2" stroke="#ffffff""##;
 const WHISKER: &str = r##"fill="none" stroke="#222222" stroke-width="1.5""##;
 
-/// Panels above each other along one x axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Chart {
-    /// Heading, also for screen readers.
-    pub title: String,
-    /// Description for screen readers.
-    pub description: String,
-    /// Quantity and unit of the x axis.
-    pub x: String,
-    /// Ordered from top to bottom.
-    pub panels: Vec<Panel>,
-}
-
-/// Panels above each other, each along its own x axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Curves {
-    /// Heading, also for screen readers.
-    pub title: String,
-    /// Description for screen readers.
-    pub description: String,
-    /// Quantity and unit of each x axis, and what is drawn over it; ordered from top to bottom.
-    pub panels: Vec<(String, Panel)>,
-}
-
-impl Chart {
-    /// The picture, to stand in a file or inside a page.
-    pub fn svg(&self) -> String {
-        let (mut canvas, top) = Canvas::new(&self.title, &self.description);
-        let end = draw(&mut canvas, &self.x, &self.panels, top);
-        canvas.svg(end + EDGE)
+/// Panels above each other along one x axis, which is named; several such below each other.
+pub fn chart(title: &str, description: &str, axes: &[(String, Vec<Panel>)]) -> String {
+    let (mut canvas, mut y) = Canvas::new(title, description);
+    for (x, panels) in axes {
+        y = draw(&mut canvas, x, panels, y) + EDGE;
     }
-}
-
-impl Curves {
-    /// The picture, to stand in a file or inside a page.
-    pub fn svg(&self) -> String {
-        let (mut canvas, mut y) = Canvas::new(&self.title, &self.description);
-        for (x, panel) in &self.panels {
-            y = draw(&mut canvas, x, std::slice::from_ref(panel), y) + EDGE;
-        }
-        canvas.svg(y)
-    }
+    canvas.svg(y)
 }
 
 /// Draws panels along one x axis below `top`; returns the last baseline.
@@ -252,7 +217,7 @@ fn line(
     canvas: &mut Canvas,
     across: &Across,
     y: &impl Fn(f64) -> f64,
-    series: &Series,
+    series: &Line,
     columns: usize,
 ) {
     let (mut path, mut pen) = (String::new(), 'M');

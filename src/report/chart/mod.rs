@@ -21,9 +21,9 @@ mod panel;
 #[cfg(test)]
 mod tests;
 
-pub use bars::{Bar, BarChart, BarGroup};
+pub use bars::{Bar, BarGroup, bar_chart};
 pub(super) use canvas::escaped;
-pub use heat::{HeatGroup, HeatMap, HeatRow};
-pub use lines::{Chart, Curves};
-pub use pairs::Pairs;
-pub use panel::{Area, Dot, Dots, Mark, Panel, Series, Span, Style, roomy};
+pub use heat::{HeatGroup, HeatRow, heat_map};
+pub use lines::chart;
+pub use pairs::pair_plot;
+pub use panel::{Area, Dot, Dots, Line, Panel, Span, Style, TimeMark, roomy};

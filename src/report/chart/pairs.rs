@@ -14,82 +14,65 @@ const DOTS: usize = 600;
 const GAP: f64 = 6.0;
 const INSIDE: f64 = 4.0;
 
-/// Histograms on the diagonal, dots below it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pairs {
-    /// Heading, also for screen readers.
-    pub title: String,
-    /// Description for screen readers.
-    pub description: String,
-    /// Name with unit and draws of each quantity.
-    pub columns: Vec<(String, Vec<f64>)>,
-    /// Group of each draw, from 0: groups have colours.
-    pub groups: Vec<usize>,
+/// Draws of quantities, each against each: histograms on the diagonal, dots below it. Columns have a name with a unit; `groups` has the
+/// group of each draw, from 0: groups have colours.
+pub fn pair_plot(
+    title: &str,
+    description: &str,
+    columns: &[(String, Vec<f64>)],
+    groups: &[usize],
+) -> String {
+    let k = columns.len().max(1) as f64;
+    let (mut canvas, top) = Canvas::new(title, description);
+    let top = top + LINE;
+    let size = (WIDTH - 2.0 * EDGE - (k - 1.0) * GAP) / k;
+    let ranges: Vec<(f64, f64)> = (columns.iter())
+        .map(|(_, values)| padded(values.iter().copied(), 0.0))
+        .collect();
+    let at = |i: usize| EDGE + i as f64 * (size + GAP);
+    for (row, (name, values)) in columns.iter().enumerate() {
+        let y = top + row as f64 * (size + GAP);
+        for (column, (_, across)) in columns[..row].iter().enumerate() {
+            let place = Square::new(&mut canvas, (at(column), y), size);
+            let points: Vec<(f64, f64)> = (across.iter().zip(values))
+                .map(|(a, b)| place.point(share(ranges[column], *a), share(ranges[row], *b)))
+                .collect();
+            dots(&mut canvas, &points, groups);
+        }
+        let place = Square::new(&mut canvas, (at(row), y), size);
+        histogram(&mut canvas, &place, ranges[row], values);
+        let name = clipped(name, TEXT, ROOM - at(row) + EDGE);
+        canvas.text((at(row) + 2.0, y - 4.0), "start", true, &name);
+    }
+    let bottom = top + k * (size + GAP) - GAP;
+    for (column, range) in ranges.iter().enumerate() {
+        let ends = [(range.0, "start", 0.0), (range.1, "end", size)];
+        let labels = ends.map(|(value, ..)| short(value));
+        // Narrow cells have room for one end in a line.
+        let is_narrow = labels.iter().map(|l| width(l, TEXT)).sum::<f64>() + GAP > size;
+        for (i, ((_, anchor, off), label)) in ends.iter().zip(&labels).enumerate() {
+            let line = if is_narrow { i as f64 } else { 0.0 };
+            let place = (at(column) + off, bottom + (line + 1.0) * LINE - 3.0);
+            canvas.text(place, anchor, false, label);
+        }
+    }
+    canvas.svg(bottom + 2.0 * LINE + EDGE)
 }
 
-impl Pairs {
-    /// The picture, to stand in a file or inside a page.
-    pub fn svg(&self) -> String {
-        let k = self.columns.len().max(1) as f64;
-        let (mut canvas, top) = Canvas::new(&self.title, &self.description);
-        let top = top + LINE;
-        let cell = (WIDTH - 2.0 * EDGE - (k - 1.0) * GAP) / k;
-        let ranges: Vec<(f64, f64)> = (self.columns.iter())
-            .map(|(_, values)| padded(values.iter().copied(), 0.0))
-            .collect();
-        let at = |i: usize| EDGE + i as f64 * (cell + GAP);
-        for (row, (name, values)) in self.columns.iter().enumerate() {
-            let y = top + row as f64 * (cell + GAP);
-            for (column, (_, across)) in self.columns[..row].iter().enumerate() {
-                let place = Cell::new(&mut canvas, (at(column), y), cell);
-                let ranges = (ranges[column], ranges[row]);
-                self.dots(&mut canvas, &place, ranges, across, values);
-            }
-            let place = Cell::new(&mut canvas, (at(row), y), cell);
-            histogram(&mut canvas, &place, ranges[row], values);
-            let room = ROOM - at(row) + EDGE;
-            let name = clipped(name, TEXT, room);
-            canvas.text((at(row) + 2.0, y - 4.0), "start", true, &name);
-        }
-        let bottom = top + k * (cell + GAP) - GAP;
-        for (column, range) in ranges.iter().enumerate() {
-            let ends = [(range.0, "start", 0.0), (range.1, "end", cell)];
-            let labels = ends.map(|(value, ..)| short(value));
-            // Narrow cells have room for one end in a line.
-            let is_narrow = labels.iter().map(|l| width(l, TEXT)).sum::<f64>() + GAP > cell;
-            for (i, ((_, anchor, off), label)) in ends.iter().zip(&labels).enumerate() {
-                let line = if is_narrow { i as f64 } else { 0.0 };
-                let place = (at(column) + off, bottom + (line + 1.0) * LINE - 3.0);
-                canvas.text(place, anchor, false, label);
+/// Draws points, each in the colour of its group.
+fn dots(canvas: &mut Canvas, points: &[(f64, f64)], groups: &[usize]) {
+    let every = points.len().div_ceil(DOTS).max(1);
+    for group in 0..=groups.iter().copied().max().unwrap_or(0) {
+        let mut path = String::new();
+        for (i, (x, y)) in points.iter().enumerate().step_by(every) {
+            if groups.get(i).copied().unwrap_or(0) == group {
+                let _ = write!(path, "M{x:.1} {y:.1}h0");
             }
         }
-        canvas.svg(bottom + 2.0 * LINE + EDGE)
-    }
-
-    fn dots(
-        &self,
-        canvas: &mut Canvas,
-        place: &Cell,
-        (x, y): ((f64, f64), (f64, f64)),
-        across: &[f64],
-        up: &[f64],
-    ) {
-        let every = across.len().div_ceil(DOTS).max(1);
-        let groups = self.groups.iter().copied().max().unwrap_or(0);
-        for group in 0..=groups {
-            let style = Style::OTHERS[group % Style::OTHERS.len()];
-            let mut path = String::new();
-            for i in (0..across.len()).step_by(every) {
-                if self.groups.get(i).copied().unwrap_or(0) == group {
-                    let (px, py) = place.point(share(x, across[i]), share(y, up[i]));
-                    let _ = write!(path, "M{px:.1} {py:.1}h0");
-                }
-            }
-            let colour = style.colour;
-            canvas.path(&path, &format!(
-                r#"stroke="{colour}" stroke-opacity="0.4" stroke-width="2.6" stroke-linecap="round""#
-            ));
-        }
+        let colour = Style::OTHERS[group % Style::OTHERS.len()].colour;
+        canvas.path(&path, &format!(
+            r#"stroke="{colour}" stroke-opacity="0.4" stroke-width="2.6" stroke-linecap="round""#
+        ));
     }
 }
 
@@ -98,7 +81,7 @@ fn share((low, high): (f64, f64), value: f64) -> f64 {
     ((value - low) / (high - low)).clamp(0.0, 1.0)
 }
 
-fn histogram(canvas: &mut Canvas, place: &Cell, range: (f64, f64), values: &[f64]) {
+fn histogram(canvas: &mut Canvas, place: &Square, range: (f64, f64), values: &[f64]) {
     let mut counts = [0usize; BINS];
     for value in values.iter().filter(|v| v.is_finite()) {
         counts[((share(range, *value) * BINS as f64) as usize).min(BINS - 1)] += 1;
@@ -116,13 +99,13 @@ fn histogram(canvas: &mut Canvas, place: &Cell, range: (f64, f64), values: &[f64
 }
 
 /// A square.
-struct Cell {
+struct Square {
     left: f64,
     top: f64,
     size: f64,
 }
 
-impl Cell {
+impl Square {
     /// Draws its frame.
     fn new(canvas: &mut Canvas, (left, top): (f64, f64), size: f64) -> Self {
         let frame = r##"fill="none" stroke="#bbbbbb""##;
@@ -150,13 +133,9 @@ mod tests {
             let values = (0..2000).map(|i| by * (f64::from(i) * 0.7).sin());
             (name.to_owned(), values.collect())
         };
-        let pairs = Pairs {
-            title: "t".into(),
-            description: "d".into(),
-            columns: vec![column("a <m>", 1.0), column("b", 2.0), column("c", 3.0)],
-            groups: (0..2000).map(|i| usize::from(i > 1000)).collect(),
-        };
-        let svg = pairs.svg();
+        let columns = [column("a <m>", 1.0), column("b", 2.0), column("c", 3.0)];
+        let groups: Vec<usize> = (0..2000).map(|i| usize::from(i > 1000)).collect();
+        let svg = pair_plot("t", "d", &columns, &groups);
         // Three histograms, three pairs in two colours each; a third of the draws is drawn.
         assert_eq!(svg.matches("<rect").count(), 1 + 6);
         assert_eq!(svg.matches("stroke-opacity").count(), 6);

@@ -15,7 +15,7 @@ pub struct Panel {
     /// Height of the axes in user units; the chart is 520 wide.
     pub height: f64,
     /// Lines, the first at the back.
-    pub series: Vec<Series>,
+    pub series: Vec<Line>,
     /// Stretches of the x axis, marked below it.
     pub spans: Vec<Span>,
     /// Bands below the lines.
@@ -23,14 +23,14 @@ pub struct Panel {
     /// Points with their intervals, over the lines.
     pub dots: Vec<Dots>,
     /// Places on the x axis.
-    pub marks: Vec<Mark>,
+    pub marks: Vec<TimeMark>,
     /// Ends of the y axis; if none, what the values need.
     pub range: Option<(f64, f64)>,
 }
 
 impl Panel {
     /// A panel of the usual height.
-    pub fn new(y: &str, series: Vec<Series>) -> Self {
+    pub fn new(y: &str, series: Vec<Line>) -> Self {
         Self {
             y: y.into(),
             height: 190.0,
@@ -61,7 +61,7 @@ impl Panel {
     }
 
     /// Sets marks on the x axis.
-    pub fn marks(self, marks: Vec<Mark>) -> Self {
+    pub fn marks(self, marks: Vec<TimeMark>) -> Self {
         Self { marks, ..self }
     }
 
@@ -89,7 +89,7 @@ impl Panel {
 
 /// One line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+pub struct Line {
     /// Name in the legend; empty for none.
     pub label: String,
     /// Colour, width, dashes.
@@ -98,7 +98,7 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
-impl Series {
+impl Line {
     /// Creates a line from points sorted by x.
     pub fn new(label: &str, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self {
@@ -210,14 +210,14 @@ pub struct Dot {
 
 /// A place on the x axis: a dashed line over the whole height, with its name beside it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mark {
+pub struct TimeMark {
     /// Position.
     pub x: f64,
     /// Its name.
     pub label: String,
 }
 
-impl Mark {
+impl TimeMark {
     /// Draws the mark between two heights; its name stands at the upper end, on the side with room.
     pub(super) fn draw(&self, canvas: &mut Canvas, across: &Across, ends: (f64, f64)) {
         let x = across.x(self.x);

@@ -1,17 +1,16 @@
 use super::canvas::{BOLD, width};
 use super::*;
 
-fn chart(panels: usize, lines: usize, samples: usize) -> Chart {
+fn panels(panels: usize, lines: usize, samples: usize) -> Vec<Panel> {
     let wave = |k: usize| (k as f64 * 0.05, (k as f64 * 0.7).sin() + (k % 17) as f64);
-    let line = |j: usize| Series::new("line", Style::OTHERS[j % 5], (0..samples).map(wave));
-    Chart {
-        title: "a < b & \"c\"\u{1}".into(),
-        description: "lines".into(),
-        x: "t in s".into(),
-        panels: (0..panels)
-            .map(|_| Panel::new("y in V", (0..lines).map(line).collect()))
-            .collect(),
-    }
+    let line = |j: usize| Line::new("line", Style::OTHERS[j % 5], (0..samples).map(wave));
+    let panel = |_| Panel::new("y in V", (0..lines).map(line).collect());
+    (0..panels).map(panel).collect()
+}
+
+fn svg(panels: &[Panel]) -> String {
+    let axis = ("t in s".to_owned(), panels.to_vec());
+    chart("a < b & \"c\"\u{1}", "lines", &[axis])
 }
 
 /// Values of all attributes called `name`.
@@ -22,19 +21,15 @@ fn attributes<'a>(svg: &'a str, name: &'a str) -> impl Iterator<Item = &'a str> 
 
 #[test]
 fn long_records_stay_small() {
-    for panels in [1, 4, 16] {
-        let svg = chart(panels, 3, 50_000).svg();
-        assert!(
-            svg.len() < 300 * 1024,
-            "{panels} panels: {} bytes",
-            svg.len()
-        );
+    for count in [1, 4, 16] {
+        let bytes = svg(&panels(count, 3, 50_000)).len();
+        assert!(bytes < 300 * 1024, "{count} panels: {bytes} bytes");
     }
 }
 
 #[test]
 fn text_is_escaped_and_spoken() {
-    let svg = chart(1, 1, 10).svg();
+    let svg = svg(&panels(1, 1, 10));
     assert!(svg.contains("<title>a &lt; b &amp; &quot;c&quot; </title>"));
     assert!(svg.contains("role=\"img\"") && svg.contains("<desc>lines</desc>"));
     assert_eq!(svg.matches("<text").count(), svg.matches("</text>").count());
@@ -42,18 +37,17 @@ fn text_is_escaped_and_spoken() {
 
 #[test]
 fn everything_is_inside_the_picture() {
-    let mut wide = chart(2, 3, 100);
-    wide.panels[0].y =
-        "a very long name of a quantity that does not fit anywhere at all in this".into();
-    for series in wide.panels.iter_mut().flat_map(|p| &mut p.series) {
+    let mut wide = panels(2, 3, 100);
+    wide[0].y = "a very long name of a quantity that does not fit anywhere at all in this".into();
+    for series in wide.iter_mut().flat_map(|p| &mut p.series) {
         series.label = "a label that takes most of a row".into();
         series
             .points
             .iter_mut()
             .for_each(|p| p.1 = 1e6 + 1e-2 * p.1);
     }
-    wide.panels[1].spans = spans();
-    assert_inside(&wide.svg());
+    wide[1].spans = spans();
+    assert_inside(&svg(&wide));
 }
 
 /// The frame of a stretch of full weight 0.4.
@@ -73,10 +67,10 @@ fn spans() -> Vec<Span> {
 
 #[test]
 fn stretches_are_told_apart_by_their_frames() {
-    let mut marked = chart(1, 1, 100);
-    let bare = marked.svg();
-    marked.panels[0].spans = spans();
-    let svg = marked.svg();
+    let mut marked = panels(1, 1, 100);
+    let bare = svg(&marked);
+    marked[0].spans = spans();
+    let svg = svg(&marked);
     assert_eq!(svg.matches("fill-opacity").count(), 2);
     assert_eq!(svg.matches(FRAMED).count(), 1);
     assert_eq!(
@@ -104,12 +98,7 @@ fn bars_keep_inside_and_name_what_they_cannot_draw() {
         per_cent: full.is_some(),
         bars: bars.to_vec(),
     });
-    let chart = |groups: Vec<BarGroup>| BarChart {
-        title: "bars".into(),
-        description: "of any length".into(),
-        groups,
-    };
-    let svg = chart(groups.to_vec()).svg();
+    let svg = bar_chart("bars", "of any length", &groups);
     assert_inside(&svg);
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
     assert_eq!(
@@ -119,24 +108,19 @@ fn bars_keep_inside_and_name_what_they_cannot_draw() {
     );
     // One rectangle is the paper; two bars of each group are positive.
     assert_eq!(svg.matches("<rect").count(), 1 + 2 * 2);
-    assert!(chart(vec![]).svg().ends_with("</svg>\n"));
+    assert!(bar_chart("bars", "none", &[]).ends_with("</svg>\n"));
 }
 
 /// Groups of one scale share it, others have their own.
 #[test]
 fn bars_have_scales() {
     let group = |full| BarGroup::new("", full, vec![Bar::new("a", 0.5, "half")]);
-    let groups = vec![
+    let groups = [
         group(Some(1.0)),
         group(Some(1.0)),
         group(Some(1.0)).per_cent(),
     ];
-    let chart = BarChart {
-        title: "bars".into(),
-        description: "of a half".into(),
-        groups,
-    };
-    let svg = chart.svg();
+    let svg = bar_chart("bars", "of a half", &groups);
     assert_inside(&svg);
     assert_eq!(svg.matches(">0.4<").count(), 1);
     assert_eq!(svg.matches(">40 %<").count(), 1);
@@ -170,40 +154,40 @@ fn assert_inside(svg: &str) {
 
 #[test]
 fn lines_break_at_holes_and_nothing_is_drawn_of_nothing() {
-    let mut holed = chart(1, 1, 10);
-    holed.panels[0].series[0].points[4].1 = f64::NAN;
-    let path = holed.svg();
+    let mut holed = panels(1, 1, 10);
+    holed[0].series[0].points[4].1 = f64::NAN;
+    let path = svg(&holed);
     let line = attributes(&path, " d").last().unwrap().to_owned();
     assert_eq!(line.matches('M').count(), 2);
     assert!(!path.contains("NaN") && !path.contains("inf"));
-    let empty = chart(1, 0, 0).svg();
+    let empty = svg(&panels(1, 0, 0));
     assert!(!empty.contains("NaN"), "{empty}");
-    assert!(chart(0, 0, 0).svg().ends_with("</svg>\n"));
+    assert!(svg(&[]).ends_with("</svg>\n"));
 }
 
 #[test]
 fn bands_points_and_marks_stay_inside_and_are_named() {
-    let mut layered = chart(1, 1, 50);
+    let mut layered = panels(1, 1, 50);
     let dot = Dot {
         x: 1.0,
         y: 2.0,
         low: -40.0,
         high: 40.0,
     };
-    let mark = |x: f64| Mark {
+    let mark = |x: f64| TimeMark {
         x,
         label: "onset 2.40 s".into(),
     };
-    layered.panels[0].dots = vec![Dots {
+    layered[0].dots = vec![Dots {
         label: "share".into(),
         points: vec![dot],
     }];
-    layered.panels[0].areas = vec![Area {
+    layered[0].areas = vec![Area {
         label: "band".into(),
         points: vec![(0.0, -1.0, 1.0), (1.0, f64::NAN, 1.0), (2.0, -2.0, 2.0)],
     }];
-    layered.panels[0].marks = vec![mark(0.1), mark(2.4)];
-    let svg = layered.svg();
+    layered[0].marks = vec![mark(0.1), mark(2.4)];
+    let svg = svg(&layered);
     assert_inside(&svg);
     assert!(!svg.contains("NaN"));
     for name in [">share<", ">band<", ">onset 2.40 s<"] {
@@ -225,21 +209,16 @@ fn a_heat_map_tells_cells_apart_by_their_frames() {
     let row = HeatRow {
         label: "a name that is much too long for the room that names have".into(),
         cells,
-        mark: Some(Mark {
+        mark: Some(TimeMark {
             x: 3.9,
             label: "onset".into(),
         }),
     };
-    let map = HeatMap {
-        title: "Windows".into(),
-        description: "cells".into(),
-        x: "t in s".into(),
-        groups: vec![HeatGroup {
-            label: "twin".into(),
-            rows: vec![row],
-        }],
+    let group = HeatGroup {
+        label: "twin".into(),
+        rows: vec![row],
     };
-    let svg = map.svg();
+    let svg = heat_map("Windows", "cells", &[group]);
     assert_inside(&svg);
     assert_eq!(svg.matches(FRAMED).count(), 1);
     assert_eq!(svg.matches("font-weight=\"600\">40 %<").count(), 1);
@@ -250,30 +229,23 @@ fn a_heat_map_tells_cells_apart_by_their_frames() {
 fn curves_have_an_axis_each() {
     let panel = |x: &str, scale: f64| {
         let points = (0..30).map(|k| (scale * k as f64, (k as f64 * 0.2).sin()));
-        let line = Series::new("a line with a label that is long", Style::AFTER, points);
-        (
-            x.to_owned(),
-            Panel::new("rate of h in V/s", vec![line]).area(Area {
-                label: "± 1 standard error".into(),
-                points: vec![(0.0, -1.0, 1.0), (scale * 29.0, f64::NAN, 2.0)],
-            }),
-        )
+        let line = Line::new("a line with a label that is long", Style::AFTER, points);
+        let panel = Panel::new("rate of h in V/s", vec![line]).area(Area {
+            label: "± 1 standard error".into(),
+            points: vec![(0.0, -1.0, 1.0), (scale * 29.0, f64::NAN, 2.0)],
+        });
+        (x.to_owned(), vec![panel])
     };
     let long = "a variable with a name so long that it takes more than the width of the picture";
-    let picture = Curves {
-        title: "Missing functions".into(),
-        description: "two".into(),
-        panels: vec![panel("h in V", 0.1), panel(long, 1e6)],
-    };
-    let svg = picture.svg();
+    let svg = chart(
+        "Functions",
+        "two",
+        &[panel("h in V", 0.1), panel(long, 1e6)],
+    );
     assert_inside(&svg);
     assert!(!svg.contains("NaN"));
     for text in [">h in V<", ">2.5<", ">2.5e7<"] {
         assert!(svg.contains(text), "{text}: {svg}");
     }
-    let none = Curves {
-        panels: vec![],
-        ..picture
-    };
-    assert!(none.svg().ends_with("</svg>\n"));
+    assert!(chart("Functions", "none", &[]).ends_with("</svg>\n"));
 }

@@ -3,7 +3,7 @@
 use super::estimate_json;
 use crate::estimator::{INTERVAL_LEVEL, Together};
 use crate::fit::Warning;
-use crate::report::digits::{Digits, error, probability, short};
+use crate::report::digits::{probability, short, with_error};
 use crate::report::document::Column::{Number, Text};
 use crate::report::document::{Block, Document, Section};
 use crate::report::parameters::{ParameterRow, values};
@@ -70,9 +70,7 @@ pub(crate) fn together_document(study: &Study, all: &Together, files: &[String])
         row.extend(names.iter().map(|name| {
             let j = estimate.names.iter().position(|own| own == *name);
             j.map_or_else(String::new, |j| {
-                let (value, std_error) = (estimate.theta[j], estimate.std_error[j]);
-                let digits = Digits::supported(value, std_error);
-                format!("{} ± {}", digits.write(value), error(std_error))
+                with_error(estimate.theta[j], estimate.std_error[j]).join(" ± ")
             })
         }));
         row.push(

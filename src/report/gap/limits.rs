@@ -5,7 +5,7 @@ use super::statement::finer_step;
 use super::words::few;
 use crate::diagnose::{Diagnosis, Maps, Visible};
 use crate::effect::EffectKey;
-use crate::report::digits::{short, unit_suffix};
+use crate::report::digits::{short, with_unit};
 use crate::report::document::Column::{Number, Text};
 use crate::report::document::{Block, Section};
 use crate::report::units::Units;
@@ -88,9 +88,7 @@ fn power(units: &Units, all: &[Visible]) -> Vec<Block> {
         let unit = units
             .of_magnitude(&v.id, &v.target, &v.magnitude)
             .unwrap_or_default();
-        let value = v
-            .value
-            .map(|value| format!("{}{}", short(value), unit_suffix(&unit)));
+        let value = v.value.map(|value| with_unit(value, &unit));
         vec![
             EffectKey::new(&v.id, &v.target).to_string(),
             v.magnitude.clone(),

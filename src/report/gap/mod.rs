@@ -12,7 +12,6 @@ mod limits;
 mod next;
 mod pictures;
 mod place;
-mod share;
 mod statement;
 #[cfg(test)]
 mod tests;
@@ -25,7 +24,7 @@ use super::parameters::{ParameterRow, priors, values};
 use super::residuals::{Left, residual_blocks};
 use super::units::Units;
 use crate::diagnose::{Diagnosis, INTERVAL_LEVEL, Verdict};
-use crate::report::digits::{Digits, error, unit_suffix};
+use crate::report::digits::{own_unit, with_error};
 use crate::report::document::Column::{Number, Text};
 use crate::study::Study;
 use serde_json::Value;
@@ -117,13 +116,10 @@ fn parameters(units: &Units, diagnosis: &Diagnosis) -> Section {
         .map(|n| {
             // A start of a further record is named `h1 (record 2)`.
             let name = n.name.split(' ').next().unwrap_or(&n.name);
-            vec![
-                n.name.clone(),
-                n.role.nuisance().unwrap_or_default().to_owned(),
-                Digits::supported(n.value, n.std_error).write(n.value),
-                error(n.std_error),
-                unit_suffix(units.variable(name)).trim_start().to_owned(),
-            ]
+            let role = n.role.nuisance().unwrap_or_default().to_owned();
+            let [value, error] = with_error(n.value, n.std_error);
+            let unit = own_unit(units.variable(name)).to_owned();
+            vec![n.name.clone(), role, value, error, unit]
         })
         .collect();
     let head = [

@@ -1,10 +1,10 @@
 //! The answer in words: headline, what follows from it, what to do next. All of it follows from verdict, decision and probabilities.
 
-use super::share::share_with_interval;
+use super::extent::share_with_interval;
 use super::words::{effect, effects, few, joined};
 use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, Verdict};
 use crate::report::NEXT_INPUT;
-use crate::report::digits::{chance, percent, short, unit_suffix};
+use crate::report::digits::{chance, percent, short, with_unit};
 use crate::report::units::Units;
 use crate::twin::Integrator;
 
@@ -361,11 +361,7 @@ pub(super) fn sentence(units: &Units, fit: &EffectFit) -> Option<String> {
     for (name, value) in &fit.magnitudes {
         let unit = units.of_magnitude(&fit.id, &fit.target, name);
         let written = match value.is_finite() {
-            true => format!(
-                "{}{}",
-                short(*value),
-                unit_suffix(&unit.unwrap_or_default())
-            ),
+            true => with_unit(*value, &unit.unwrap_or_default()),
             false => "any value".to_owned(),
         };
         text = text.replace(&format!("{{{name}}}"), &written);

@@ -1,11 +1,13 @@
-//! The paper's trajectory figures: what the twin shows at each method's answer.
+//! The figures of scores over many records: what the twin shows at each method's answer; coverage and error over a grid.
 
+use crate::estimator::INTERVAL_LEVEL;
 use crate::evaluate::baseline::Initialisation::Bad;
-use crate::evaluate::paper::{AnswerRuns, MeanRuns, ScoredMethod};
+use crate::evaluate::paper::{AnswerRuns, MeanRuns, PointScore, ScoredMethod};
 use crate::record::Signal;
-use crate::report::chart::{Chart, Panel, Series, Style, roomy};
-use crate::report::digits::named;
+use crate::report::chart::{Dot, Dots, Line, Panel, Span, Style, chart, roomy};
+use crate::report::digits::{in_unit, named};
 use crate::study::Study;
+use crate::twin::Parameter;
 
 /// Which methods a panel shows.
 type Belongs = fn(ScoredMethod) -> bool;
@@ -42,21 +44,12 @@ pub fn mean_runs_svg(study: &Study, means: &MeanRuns) -> Option<String> {
             }
         }
     }
-    let chart = Chart {
-        title: format!(
-            "{}: truth, and mean of {} predictions",
-            study.name(),
-            means.runs
-        ),
-        description: format!(
-            "Noise-free outputs of the twin at the true parameters, and at the estimates of each method: means over \
-             {} simulated records.",
-            means.runs
-        ),
-        x: "t in s".into(),
-        panels,
-    };
-    Some(chart.svg())
+    let (name, runs) = (study.name(), means.runs);
+    let title = format!("{name}: truth, and mean of {runs} predictions");
+    let description = format!(
+        "Noise-free outputs of the twin at the true parameters, and at the estimates of each method: means over {runs} simulated records."
+    );
+    Some(chart(&title, &description, &[("t in s".into(), panels)]))
 }
 
 /// One record and free runs at what it made of the pretrained network, of the final answer, and of both baselines from their bad starts.
@@ -86,15 +79,9 @@ pub fn first_run_svg(study: &Study, runs: &AnswerRuns) -> String {
                 .collect::<Vec<_>>()
         })
         .collect();
-    let chart = Chart {
-        title: format!("{}: the first record and its twins", study.name()),
-        description: "The first simulated record, and noise-free outputs of the twin at what each method estimated from \
-                      it."
-            .into(),
-        x: "t in s".into(),
-        panels,
-    };
-    chart.svg()
+    let title = format!("{}: the first record and its twins", study.name());
+    let description = "The first simulated record, and noise-free outputs of the twin at what each method estimated from it.";
+    chart(&title, description, &[("t in s".into(), panels)])
 }
 
 /// A trajectory with its name.
@@ -128,7 +115,86 @@ fn panel(
         .chain(lines)
         .map(|Trajectory(label, style, signal)| {
             let points = times.iter().copied().zip(signal.column(channel).to_vec());
-            Series::new(label, *style, points).within(shown.clone())
+            Line::new(label, *style, points).within(shown.clone())
         });
     Panel::new(title, series.collect()).height(150.0)
+}
+
+/// Parameters that are drawn: more panels are a roll, not a picture.
+const SHOWN: usize = 6;
+/// Heights of the two panels of a parameter.
+const COVERAGE: f64 = 150.0;
+const ERROR: f64 = 110.0;
+
+/// For each parameter, over its true value: the share of intervals that held it, with its 95 % interval, and the root mean square
+/// error of the refitted estimate. Bars below the axes mark the prior. `None` without a grid.
+pub fn coverage_svg(study: &Study, points: &[PointScore]) -> Option<String> {
+    let records = |point: &PointScore| point.coverage.first().map_or(0, |c| c.held.of);
+    let (least, all) = (
+        points.iter().map(records).min()?,
+        points.iter().map(records).sum::<u64>(),
+    );
+    let each = match all == least * points.len() as u64 {
+        true => least.to_string(),
+        false => format!("at least {least}"),
+    };
+    let space = study.twin().parameters();
+    let panels = space
+        .iter()
+        .enumerate()
+        .take(SHOWN)
+        .flat_map(|(j, parameter)| {
+            let dots = |dot: &dyn Fn(&PointScore) -> Dot| -> Vec<Dot> {
+                let mut dots: Vec<Dot> = points.iter().map(dot).collect();
+                dots.sort_by(|a, b| a.x.total_cmp(&b.x));
+                dots
+            };
+            let shares = dots(&|point| {
+                let (x, y) = (point.theta[j], point.coverage[j].share);
+                let (low, high) = point.coverage[j].held.interval();
+                Dot { x, y, low, high }
+            });
+            let errors = dots(&|point| {
+                let (x, y) = (point.theta[j], point.rmse[j]);
+                let (low, high) = (y, y);
+                Dot { x, y, low, high }
+            });
+            let x = format!("true {}{}", parameter.name, in_unit(&parameter.unit));
+            let share = over_bounds(parameter, "share held", ("nominal", INTERVAL_LEVEL))
+                .height(COVERAGE)
+                .range(0.0, 1.0)
+                .dots(Dots {
+                    label: "records at one θ, 95 % interval".into(),
+                    points: shares,
+                });
+            let error = over_bounds(parameter, "rms error", ("", 0.0))
+                .height(ERROR)
+                .dots(Dots {
+                    label: String::new(),
+                    points: errors,
+                });
+            [(x.clone(), vec![share]), (x, vec![error])]
+        });
+    let title = format!("{}: coverage and error over the truth", study.name());
+    let description = format!(
+        "Share of {:.0} % intervals that held the true value, and root mean square error, at {} fixed points with {each} records \
+         each, {all} in all.",
+        100.0 * INTERVAL_LEVEL,
+        points.len(),
+    );
+    Some(chart(&title, &description, &panels.collect::<Vec<_>>()))
+}
+
+/// A panel over the bounds of a parameter, with a line at a level and a bar at the prior.
+fn over_bounds(parameter: &Parameter, what: &str, (label, level): (&str, f64)) -> Panel {
+    let (bounds, prior) = (parameter.bounds, parameter.prior);
+    let line = [(bounds.low(), level), (bounds.high(), level)];
+    let series = vec![Line::new(label, Style::ZERO, line)];
+    Panel::new(&format!("{}: {what}", parameter.name), series).spans(vec![Span {
+        from: prior.low(),
+        to: prior.high(),
+        label: "prior".into(),
+        weight: 0.3,
+        clear: false,
+    }])
 }

@@ -1,13 +1,9 @@
 //! Scores over many records as JSON, tables and figures.
 
-mod coverage;
 mod figures;
-mod json;
+mod scores;
 #[cfg(test)]
 mod tests;
-mod text;
 
-pub use coverage::coverage_svg;
-pub use figures::{first_run_svg, mean_runs_svg};
-pub use json::reproduce_json;
-pub use text::reproduce_text;
+pub use figures::{coverage_svg, first_run_svg, mean_runs_svg};
+pub use scores::{reproduce_json, reproduce_text};

@@ -1,7 +1,8 @@
-//! The tables of a scorecard, for the terminal and for the page.
+//! The tables and pictures of a scorecard, for the terminal and for the page.
 
 use crate::evaluate::Count;
 use crate::evaluate::trials::{Breakdown, BreakdownLine, Kind, Scorecard, TrialRow};
+use crate::report::chart::{Bar, BarGroup, Dot, Dots, Line, Panel, Style, bar_chart, chart};
 use crate::report::digits::{percent, short};
 use crate::report::document::Block;
 use crate::report::document::Column::{self, Number, Text};
@@ -201,4 +202,72 @@ pub(super) fn nats(line: &BreakdownLine) -> String {
         Some(high) => format!("{low:.0} … {high:.0} nats"),
         None => format!("above {low:.0} nats"),
     }
+}
+
+/// Delivered answers by expected information as bars; `None` without gaps.
+pub(super) fn delivered_svg(card: &Scorecard) -> Option<String> {
+    let bins = card.breakdown("by_information")?;
+    let last = bins.lines.last()?;
+    let delivered = |line: &BreakdownLine| bins.count(line, "delivered").unwrap_or_default();
+    let bar = |line: &BreakdownLine| {
+        let delivered = delivered(line);
+        let (low, high) = delivered.interval();
+        Bar::new(
+            &nats(line),
+            delivered.share().unwrap_or(f64::NAN),
+            &of(delivered),
+        )
+        .clear(true)
+        .interval(Some([low, high]))
+    };
+    let groups = [
+        ("listed", "a listed effect is there"),
+        ("random", "a law that nobody listed"),
+    ];
+    let groups = groups.map(|(truths, label)| {
+        let label = format!("{label}: share of right answers, 95 % interval");
+        let lines = (bins.lines.iter()).filter(|line| line.label("truths") == truths);
+        BarGroup::new(&label, Some(1.0), lines.map(bar).collect()).per_cent()
+    });
+    let filled = groups.into_iter().filter(|group| !group.bars.is_empty());
+    let groups: Vec<BarGroup> = filled.collect();
+    let (last, right) = (nats(last), of(delivered(last)));
+    let description = format!("Bars with 95 % intervals; {last} {right} delivered.");
+    Some(bar_chart(
+        "Right answers, by expected information",
+        &description,
+        &groups,
+    ))
+}
+
+/// Right answers by stated probability; `None` where no effect was stated.
+pub(super) fn reliability_svg(card: &Scorecard) -> Option<String> {
+    let dot = |line: &BreakdownLine| {
+        let right = line.counts.first().copied().flatten()?;
+        let (low, high) = right.interval();
+        Some(Dot {
+            x: line.label("stated").as_f64()?,
+            y: right.share()?,
+            low,
+            high,
+        })
+    };
+    let lines = &card.breakdown("reliability")?.lines;
+    let points: Vec<Dot> = lines.iter().filter_map(dot).collect();
+    if points.is_empty() {
+        return None;
+    }
+    let diagonal = [(0.0, 0.0), (1.0, 1.0)];
+    let series = vec![Line::new("as stated", Style::RECORD, diagonal)];
+    let dots = Dots {
+        label: "share, 95 % interval".into(),
+        points,
+    };
+    let panel = Panel::new("share right", series)
+        .dots(dots)
+        .range(-0.03, 1.03);
+    let axis = ("stated probability".to_owned(), vec![panel]);
+    let description = "Share of right answers by stated probability, with 95 % intervals; the diagonal is perfect.";
+    let title = "How often the most probable effect is right";
+    Some(chart(title, description, &[axis]))
 }

@@ -1,24 +1,12 @@
 //! The pictures of a diagnosis.
 
-mod discovery;
-mod explanations;
-mod extent;
-mod functions;
-mod horizons;
-mod next;
+mod answers;
+mod courses;
 mod places;
-mod runs;
-mod time;
 
-pub(super) use discovery::terms;
-pub(super) use explanations::explanations;
-pub(super) use extent::extent;
-pub(super) use functions::functions;
-pub(super) use horizons::horizons;
-pub(super) use next::next_input;
+pub(super) use answers::{explanations, extent, horizons, terms};
+pub(super) use courses::{functions, next_input, runs, time};
 pub(super) use places::{bands, channels, lags, regions, targets};
-pub(super) use runs::runs;
-pub(super) use time::time;
 
 use crate::diagnose::Diagnosis;
 use crate::study::Study;

@@ -1,8 +1,8 @@
 //! Places: in the twin, at values of its variables, by output, lag and frequency.
 
 use crate::diagnose::{Cell, Diagnosis};
-use crate::report::chart::{Bar, BarChart, BarGroup};
-use crate::report::digits::{chance, percent, short, unit_suffix};
+use crate::report::chart::{Bar, BarGroup, bar_chart};
+use crate::report::digits::{chance, percent, short, with_unit};
 use crate::report::gap::statement::places;
 use crate::report::units::Units;
 use crate::study::Study;
@@ -22,17 +22,14 @@ pub fn targets(diagnosis: &Diagnosis) -> Option<String> {
             let is_answer = answer.contains(&t.target.as_str());
             Bar::new(&t.target, t.probability, &chance(t.probability)).clear(is_answer)
         });
-    let chart = BarChart {
-        title: "Where in the twin".into(),
-        description: format!(
-            "Bars of {} places; the first is {} with {}.",
-            targets.len(),
-            first.target,
-            chance(first.probability)
-        ),
-        groups: vec![BarGroup::new("", Some(1.0), bars.collect())],
-    };
-    Some(chart.svg())
+    let description = format!(
+        "Bars of {} places; the first is {} with {}.",
+        targets.len(),
+        first.target,
+        chance(first.probability)
+    );
+    let group = BarGroup::new("", Some(1.0), bars.collect());
+    Some(bar_chart("Where in the twin", &description, &[group]))
 }
 
 /// Cells that stand out as bars, clearest first; `at` gives the group of a cell, its place in the group and its name there.
@@ -53,21 +50,16 @@ fn shares<C: Cell>(
         let bars = bars.into_iter().map(|(_, bar)| bar).collect();
         BarGroup::new(&group, None, bars).per_cent()
     });
-    let chart = BarChart {
-        title: title.into(),
-        description: format!(
-            "Bars of {} parts; the clearest is {group} {name}.",
-            cells.len()
-        ),
-        groups: groups.collect(),
-    };
-    (!chart.groups.is_empty()).then(|| chart.svg())
+    let groups: Vec<BarGroup> = groups.collect();
+    let parts = cells.len();
+    let description = format!("Bars of {parts} parts; the clearest is {group} {name}.");
+    (!groups.is_empty()).then(|| bar_chart(title, &description, &groups))
 }
 
 fn between(low: f64, high: f64, unit: &str) -> String {
     match low == high {
-        true => format!("{}{unit}", short(low)),
-        false => format!("{} … {}{unit}", short(low), short(high)),
+        true => with_unit(low, unit),
+        false => format!("{} … {}", short(low), with_unit(high, unit)),
     }
 }
 
@@ -76,8 +68,8 @@ pub fn regions(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let units = Units::of(study);
     let regions = diagnosis.location.maps.notable().regions;
     shares("At which values", &regions, |r| {
-        let unit = unit_suffix(units.variable(&r.variable));
-        (r.variable.clone(), r.low, between(r.low, r.high, &unit))
+        let range = between(r.low, r.high, units.variable(&r.variable));
+        (r.variable.clone(), r.low, range)
     })
 }
 
@@ -99,7 +91,7 @@ pub fn lags(diagnosis: &Diagnosis) -> Option<String> {
             true => format!("{} on its own past", l.channel),
             false => format!("{} on the past of {}", l.channel, l.signal),
         };
-        (past, l.from, between(l.from, l.to, " s"))
+        (past, l.from, between(l.from, l.to, "s"))
     })
 }
 
@@ -107,6 +99,6 @@ pub fn lags(diagnosis: &Diagnosis) -> Option<String> {
 pub fn bands(diagnosis: &Diagnosis) -> Option<String> {
     let bands = diagnosis.location.maps.notable().bands;
     shares("At which frequencies", &bands, |b| {
-        (b.channel.clone(), b.low, between(b.low, b.high, " Hz"))
+        (b.channel.clone(), b.low, between(b.low, b.high, "Hz"))
     })
 }
