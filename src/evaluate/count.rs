@@ -7,6 +7,9 @@ use serde::{Serialize, Serializer};
 /// Level of the Clopper–Pearson intervals.
 pub(crate) const LEVEL: f64 = 0.95;
 
+/// Most records of a study, and of a folder of trials; what is known of each is in memory.
+pub(crate) const MOST_RECORDS: usize = 1_000_000;
+
 /// A count and the number of cases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Count {

@@ -12,5 +12,5 @@ pub(crate) mod fuzzing;
 pub mod paper;
 pub mod trials;
 
-pub(crate) use count::{Count, LEVEL};
+pub(crate) use count::{Count, LEVEL, MOST_RECORDS};
 pub use error::EvaluateError;

@@ -11,7 +11,7 @@ use crate::study::Study;
 use serde_json::{Value, json};
 
 /// One study, fitted and scored.
-pub(crate) struct Compared {
+pub(crate) struct ComparedStudy {
     /// Name: that of its file.
     pub name: String,
     pub study: Study,
@@ -21,15 +21,15 @@ pub(crate) struct Compared {
 }
 
 /// Evidence over that of the first study, in nats.
-fn gain(all: &[Compared], own: &Compared) -> Option<f64> {
-    let of = |compared: &Compared| compared.fit.evidence.map(|e| e.log_evidence);
+fn gain(all: &[ComparedStudy], own: &ComparedStudy) -> Option<f64> {
+    let of = |compared: &ComparedStudy| compared.fit.evidence.map(|e| e.log_evidence);
     Some(of(own)? - of(all.first()?)?)
 }
 
 /// The comparison as one JSON object, `truetwin.compare/1`: of each study its fit in short, log evidence over the first study on the
 /// fitted records, and errors and log score on the validation record.
-pub(crate) fn compare_json(all: &[Compared]) -> Value {
-    let one = |own: &Compared| {
+pub(crate) fn compare_json(all: &[ComparedStudy]) -> Value {
+    let one = |own: &ComparedStudy| {
         json!({
             "study": own.name,
             "twin": own.study.name(),
@@ -50,7 +50,7 @@ pub(crate) fn compare_json(all: &[Compared]) -> Value {
 }
 
 /// The comparison for people: the best study, then a table, one study a line.
-pub(crate) fn compare_document(all: &[Compared], what: &str) -> Document {
+pub(crate) fn compare_document(all: &[ComparedStudy], what: &str) -> Document {
     let rows = all.iter().map(|own| {
         let evidence = gain(all, own).map_or("–".into(), |nats| match nats > 0.0 {
             true => format!("+{}", short(nats)),
@@ -63,12 +63,10 @@ pub(crate) fn compare_document(all: &[Compared], what: &str) -> Document {
             short(own.score.log_score),
             errors(&own.score.errors, |e| Some(e.one_step)),
             errors(&own.score.errors, |e| e.free_run),
-            if own.fit.convergence.converged {
-                ""
-            } else {
-                "not converged"
-            }
-            .into(),
+            match own.fit.convergence.converged {
+                true => String::new(),
+                false => "not converged".into(),
+            },
         ]
     });
     let head = [
@@ -105,7 +103,7 @@ fn errors(all: &[OutputErrors], of: impl Fn(&OutputErrors) -> Option<f64>) -> St
 }
 
 /// The validation record with the free run of each study over it, and what each leaves.
-pub(crate) fn compare_svg(all: &[Compared], record: &Record) -> String {
+pub(crate) fn compare_svg(all: &[ComparedStudy], record: &Record) -> String {
     let outputs = all
         .first()
         .map_or_else(Vec::new, |own| own.study.twin().signals().outputs);

@@ -94,10 +94,7 @@ pub(super) fn fit_document(study: &Study, records: &[Record], fit: &Fit) -> Docu
         sections.push(Section::new("records", "Further records", others));
     }
     let residuals: Vec<Left<'_>> = (records.iter().zip(&fit.residuals))
-        .map(|(record, outputs)| Left {
-            inputs: record.drive().inputs(),
-            outputs,
-        })
+        .map(|(record, outputs)| (record.drive().inputs(), outputs))
         .collect();
     if !residuals.is_empty() {
         let of_what = "one-step errors over their standard deviation";

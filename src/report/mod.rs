@@ -47,7 +47,7 @@ mod scorecard;
 mod units;
 
 pub(crate) use check::check_document;
-pub(crate) use compare::{Compared, compare_document, compare_json, compare_svg};
+pub(crate) use compare::{ComparedStudy, compare_document, compare_json, compare_svg};
 pub(crate) use document::Document;
 pub(crate) use estimate::{together_document, together_json};
 pub(crate) use fit::posterior_svg;

@@ -5,9 +5,6 @@ use super::digits::{in_unit, named, short, with_unit};
 use crate::record::{Quantity, Record, Signal};
 use crate::study::Study;
 
-/// Height of a panel of residuals.
-const RESIDUAL_HEIGHT: f64 = 90.0;
-
 /// A run of a twin beside a record: name, style, N × outputs.
 pub(super) struct Run<'a>(pub &'a str, pub Style, pub &'a Signal);
 
@@ -62,7 +59,7 @@ impl RecordPicture<'_> {
         let label = format!("{}: record − twin{}", output.name, in_unit(&output.unit));
         match left.is_empty() {
             true => vec![above],
-            false => vec![above, Panel::new(&label, left).height(RESIDUAL_HEIGHT)],
+            false => vec![above, Panel::new(&label, left).height(90.0)],
         }
     }
 

@@ -14,16 +14,9 @@ const BAND: f64 = 1.96;
 const QUANTILES: usize = 200;
 /// Panels of cross-correlations; more pairs of output and input are left out.
 const PAIRS: usize = 12;
-/// Height of a panel of correlations.
-const HEIGHT: f64 = 120.0;
 
-/// Residuals of one record beside its inputs.
-pub(super) struct Left<'a> {
-    /// N × inputs.
-    pub inputs: &'a Signal,
-    /// N × outputs; NaN where nothing was measured.
-    pub outputs: &'a Signal,
-}
+/// Inputs of one record, N × inputs, and its residuals, N × outputs; NaN where nothing was measured.
+pub(super) type Left<'a> = (&'a Signal, &'a Signal);
 
 /// The pictures of the residuals of all records, which are `of_what`; those of a right twin are white, or are not.
 pub(super) fn residual_blocks(
@@ -110,7 +103,7 @@ fn panel(label: &str, at: impl Fn(usize) -> f64, lags: [usize; 2], count: Option
     });
     let ends = [lags[0] as f64 - 0.5, lags[1] as f64 + 0.5];
     let zero = Line::new("", Style::ZERO, ends.map(|x| (x, 0.0)));
-    let panel = Panel::new(label, vec![zero]).height(HEIGHT);
+    let panel = Panel::new(label, vec![zero]).height(120.0);
     let panel = match count {
         None => panel,
         Some(count) => {
@@ -129,14 +122,14 @@ fn panel(label: &str, at: impl Fn(usize) -> f64, lags: [usize; 2], count: Option
 
 /// Number of residuals of an output that are there.
 fn count(all: &[Left<'_>], j: usize) -> usize {
-    let there = |l: &Left<'_>| l.outputs.column(j).iter().filter(|v| v.is_finite()).count();
-    all.iter().map(there).sum()
+    let columns = all.iter().flat_map(|(_, outputs)| outputs.column(j));
+    columns.filter(|v| v.is_finite()).count()
 }
 
 /// Auto-correlations of the residuals of each output.
 fn auto_correlations(names: &[String], is_white: bool, all: &[Left<'_>]) -> String {
     let panels = names.iter().enumerate().map(|(j, name)| {
-        let own = centred(all, |l| l.outputs, j);
+        let own = centred(all, |l| l.1, j);
         let at = |lag| correlation(&own, &own, lag);
         let label = format!("correlation of {name}");
         panel(&label, at, [1, LAGS], is_white.then(|| count(all, j)))
@@ -157,8 +150,8 @@ fn cross_correlations(
     let panels: Vec<Panel> = pairs
         .take(PAIRS)
         .map(|(j, i)| {
-            let late = centred(all, |l| l.outputs, j);
-            let early = centred(all, |l| l.inputs, i);
+            let late = centred(all, |l| l.1, j);
+            let early = centred(all, |l| l.0, i);
             let label = format!("correlation of {} with {}", outputs[j], inputs[i]);
             let at = |lag| correlation(&late, &early, lag);
             panel(&label, at, [0, LAGS], is_white.then(|| count(all, j)))
@@ -183,7 +176,9 @@ fn cross_correlations(
 fn quantiles(names: &[String], all: &[Left<'_>]) -> String {
     let normal = Normal::standard();
     let panels = names.iter().enumerate().map(|(j, name)| {
-        let columns = all.iter().flat_map(|l| l.outputs.column(j).to_vec());
+        let columns = all
+            .iter()
+            .flat_map(|(_, outputs)| outputs.column(j).to_vec());
         let mut values: Vec<f64> = columns.filter(|v| v.is_finite()).collect();
         values.sort_unstable_by(f64::total_cmp);
         let n = values.len().max(1) as f64;
@@ -222,11 +217,9 @@ mod tests {
                 k => 0.5 * noise(k - 3 + from),
             })
         });
-        let all: Vec<Left<'_>> = (inputs.iter().zip(&outputs))
-            .map(|(inputs, outputs)| Left { inputs, outputs })
-            .collect();
-        let late = centred(&all, |l| l.outputs, 0);
-        let early = centred(&all, |l| l.inputs, 0);
+        let all: Vec<Left<'_>> = inputs.iter().zip(&outputs).collect();
+        let late = centred(&all, |l| l.1, 0);
+        let early = centred(&all, |l| l.0, 0);
         let at: Vec<f64> = (0..=LAGS)
             .map(|lag| correlation(&late, &early, lag))
             .collect();

@@ -2,7 +2,7 @@
 
 use crate::cli::prelude::*;
 use crate::fit::FitSettings;
-use crate::report::{Compared, compare_document, compare_json, compare_svg};
+use crate::report::{ComparedStudy, compare_document, compare_json, compare_svg};
 
 /// Share of a record that is fitted where no other is given.
 const FITTED: f64 = 2.0 / 3.0;
@@ -55,7 +55,7 @@ impl Verb for Compare {
             let score = study.score(&fit, &validation).in_file(path)?;
             let name = path.file_stem().unwrap_or_default();
             let name = name.to_string_lossy().into();
-            compared.push(Compared {
+            compared.push(ComparedStudy {
                 name,
                 study,
                 fit,

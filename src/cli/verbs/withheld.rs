@@ -2,6 +2,7 @@
 
 use crate::cli::prelude::*;
 use crate::diagnose::Ablation;
+use crate::evaluate::MOST_RECORDS;
 use crate::evaluate::trials::{self, Families, Kind, TrialSettings};
 use crate::setting::did_you_mean;
 use crate::storage::work::Share;
@@ -103,8 +104,8 @@ impl Verb for Withheld {
 /// Parses a number of trials. A number that is too large is refused with the limit, however it is written.
 fn number_of_trials(text: &str) -> Result<usize, String> {
     match text.parse::<f64>() {
-        Ok(number) if number > trials::MOST as f64 => {
-            Err(format!("choose at most {}", trials::MOST))
+        Ok(number) if number > MOST_RECORDS as f64 => {
+            Err(format!("choose at most {MOST_RECORDS}"))
         }
         _ => at_least_one(text),
     }

@@ -7,6 +7,7 @@ pub use dual_ekf::dual_filter;
 pub use prediction_error::prediction_error;
 
 use crate::twin::{Noise, ParameterSpace, TwinError};
+use serde::Serialize;
 use std::fmt;
 
 /// Numbers of the authors' code of Lakshminarayanan, Guerrero & Rojas.
@@ -58,7 +59,8 @@ const BASELINE: BaselineNumbers = BaselineNumbers {
 /// | bad | for each parameter the bound farther from the truth |
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V; the spread is that of the authors' code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Initialisation {
     /// Near the truth.
@@ -110,11 +112,7 @@ impl Initialisation {
 
 impl fmt::Display for Initialisation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Good => "good",
-            Self::Ts => "ts",
-            Self::Bad => "bad",
-        })
+        self.serialize(f)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::scenario::ScenarioDraws;
 use super::{Benchmark, BenchmarkRun, Scenario};
 use crate::estimator::{Estimator, PretrainOptions, Recipe};
-use crate::evaluate::EvaluateError;
+use crate::evaluate::{EvaluateError, MOST_RECORDS};
 use crate::progress::Progress;
 use crate::setting::SettingError;
 use crate::storage::StorageError;
@@ -11,9 +11,6 @@ use crate::storage::work::{Manifest, Piece, Pieces, Share, WorkFolder, checksum}
 use crate::study::Study;
 use serde_json::json;
 use std::path::Path;
-
-/// Most runs of a study; they are in memory.
-const MOST: usize = 1_000_000;
 
 /// Folder of kept runs.
 pub(super) const RUNS: &str = "runs";
@@ -46,8 +43,8 @@ pub struct MonteCarlo {
 impl MonteCarlo {
     /// Checks that the study has this scenario; worth asking before an estimator is trained.
     pub fn check(&self, study: &Study) -> Result<(), EvaluateError> {
-        let limit = format!("choose at most {MOST}");
-        SettingError::unless(self.runs <= MOST, "runs", self.runs, limit)?;
+        let limit = format!("choose at most {MOST_RECORDS}");
+        SettingError::unless(self.runs <= MOST_RECORDS, "runs", self.runs, limit)?;
         self.draws(study).map(|_| ())
     }
 

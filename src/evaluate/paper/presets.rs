@@ -130,19 +130,12 @@ impl Benchmark {
     }
 }
 
-const fn point(name: &'static str, first: f64, second: f64) -> TestPoint {
-    TestPoint {
-        name,
-        values: [first, second],
-    }
-}
-
-const VAN_DER_POL_POINTS: [TestPoint; 1] = [point("nu", 3.0, 5.0)];
+const VAN_DER_POL_POINTS: [TestPoint; 1] = [("nu", [3.0, 5.0])];
 const TANKS_POINTS: [TestPoint; 4] = [
-    point("k1", 1.2, 1.3),
-    point("k2", 1.2, 1.3),
-    point("k3", 0.9, 0.6),
-    point("k4", 1.0, 0.7),
+    ("k1", [1.2, 1.3]),
+    ("k2", [1.2, 1.3]),
+    ("k3", [0.9, 0.6]),
+    ("k4", [1.0, 0.7]),
 ];
 
 /// Levels of the authors' evaluation input, each held for 30 samples.

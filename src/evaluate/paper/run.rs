@@ -1,6 +1,6 @@
 //! Every method on one simulated record: the rows of the table.
 
-use super::scenario::Simulated;
+use super::scenario::SimulatedRecord;
 use crate::estimator::{Contributions, Estimate, EstimateOptions, Estimator};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::baseline::{Initialisation, dual_filter, prediction_error};
@@ -48,11 +48,11 @@ impl BenchmarkRun {
     pub(super) fn new(
         estimator: &Estimator,
         run: usize,
-        simulated: &Simulated,
+        simulated: &SimulatedRecord,
         progress: &Progress,
     ) -> Result<Self, EvaluateError> {
         let twin = estimator.study().twin();
-        let Simulated {
+        let SimulatedRecord {
             truth,
             record,
             noise,

@@ -4,7 +4,7 @@ use super::{Invariant, ScoredMethod, Symmetry};
 use crate::evaluate::EvaluateError;
 use crate::fit::least_squares::{Bounds, space_filling};
 use crate::record::{Drive, Record, RecordError, Signal};
-use crate::study::{DriveSource, RecordPlan, Study, StudyError};
+use crate::study::{DriveSource, RecordPlan, Study};
 use crate::twin::{Interval, Noise, Parameter, ParameterSpace};
 use nalgebra::DVector;
 use serde::Serialize;
@@ -67,14 +67,8 @@ pub struct Benchmark {
     pub published: &'static [(ScoredMethod, Published)],
 }
 
-/// One parameter at the test points.
-#[derive(Debug, Clone, Copy)]
-pub struct TestPoint {
-    /// Parameter.
-    pub name: &'static str,
-    /// Its value at OOD 1 and OOD 2.
-    pub values: [f64; 2],
-}
+/// A parameter and its values at OOD 1 and OOD 2.
+pub type TestPoint = (&'static str, [f64; 2]);
 
 /// A published figure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -87,7 +81,7 @@ pub struct Published {
 }
 
 /// A simulated record and what it came from.
-pub(super) struct Simulated {
+pub(super) struct SimulatedRecord {
     pub(super) truth: Vec<f64>,
     pub(super) record: Record,
     pub(super) noise: Noise,
@@ -101,14 +95,9 @@ pub(super) struct ScenarioDraws<'a> {
     held: Vec<Option<f64>>,
     /// Points of [`Scenario::Grid`].
     grid: Vec<Vec<f64>>,
-    inputs: InputSource,
-}
-
-enum InputSource {
-    /// The same for all.
-    Fixed(Drive),
-    /// The study's.
-    Study(DriveSource),
+    /// The inputs of all records; none where each has its own, drawn from the study's plan.
+    inputs: Option<Drive>,
+    drives: DriveSource,
 }
 
 impl<'a> ScenarioDraws<'a> {
@@ -123,10 +112,10 @@ impl<'a> ScenarioDraws<'a> {
         }
         let held = (study.twin().parameters().iter())
             .map(|p| {
-                let point = benchmark.points.iter().find(|point| point.name == p.name);
+                let point = benchmark.points.iter().find(|(name, _)| *name == p.name);
                 let (name, value) = match (point, scenario) {
-                    (Some(point), Scenario::First) => (point.name, point.values[0]),
-                    (Some(point), Scenario::Second) => (point.name, point.values[1]),
+                    (Some((name, [first, _])), Scenario::First) => (*name, *first),
+                    (Some((name, [_, second])), Scenario::Second) => (*name, *second),
                     _ => return Ok(None),
                 };
                 let bounds = p.bounds;
@@ -142,13 +131,9 @@ impl<'a> ScenarioDraws<'a> {
             .collect::<Result<_, _>>()?;
         // A study that says what its records look like means its own.
         let own = benchmark.levels.is_empty() || study.file().record.is_plan();
-        let inputs = if own {
-            InputSource::Study(study.drives()?)
-        } else {
-            let plan = study.plan().ok_or(StudyError::NoPlan)?;
-            let channels = study.twin().signals().inputs.len();
-            InputSource::Fixed(staircase(plan, channels, benchmark)?)
-        };
+        let plan = study.plan().filter(|_| !own);
+        let channels = study.twin().signals().inputs.len();
+        let inputs = plan.map(|plan| staircase(plan, channels, benchmark));
         let grid = match scenario {
             Scenario::Grid => grid(&study.twin().parameters())?,
             _ => vec![],
@@ -158,7 +143,8 @@ impl<'a> ScenarioDraws<'a> {
             scenario,
             grid,
             held,
-            inputs,
+            inputs: inputs.transpose()?,
+            drives: study.drives()?,
         })
     }
 
@@ -179,14 +165,18 @@ impl<'a> ScenarioDraws<'a> {
             .map(|(held, drawn)| held.unwrap_or(drawn))
             .collect();
         let drive = match &self.inputs {
-            InputSource::Fixed(drive) => drive.clone(),
-            InputSource::Study(source) => source.draw(noise)?,
+            Some(drive) => drive.clone(),
+            None => self.drives.draw(noise)?,
         };
         Ok((theta, drive))
     }
 
     /// Record number `run` under `seed`. Where θ is drawn, a draw that diverges is drawn again.
-    pub(super) fn simulated(&self, seed: u64, run: usize) -> Result<Simulated, EvaluateError> {
+    pub(super) fn simulated(
+        &self,
+        seed: u64,
+        run: usize,
+    ) -> Result<SimulatedRecord, EvaluateError> {
         let first = Noise::new(seed, "record", run as u64);
         let can_redraw = !self.scenario.is_point() && self.scenario != Scenario::Grid;
         let mut attempt = 0;
@@ -199,7 +189,7 @@ impl<'a> ScenarioDraws<'a> {
             let (truth, drive) = self.draw(run, noise)?;
             match self.study.twin().simulate(&truth, &drive, noise) {
                 Ok(outputs) => {
-                    return Ok(Simulated {
+                    return Ok(SimulatedRecord {
                         truth,
                         record: Record::complete(drive, outputs)?,
                         noise,

@@ -90,14 +90,14 @@ pub(crate) struct Refitted {
 
 /// Everything that a diagnosis is given.
 #[derive(Clone)]
-pub(super) struct Question<'q> {
+pub(super) struct TrialQuestion<'q> {
     pub study: &'q Study,
     pub record: &'q Record,
     pub validation: Option<&'q Record>,
     pub settings: DiagnoseSettings,
 }
 
-impl Question<'_> {
+impl TrialQuestion<'_> {
     /// Diagnoses. A diagnosis that fails is an answer, too, with its reason; only a stop is an error.
     pub fn ask(&self, progress: &Progress) -> Result<Result<Outcome, String>, Cancelled> {
         let records = [self.record.clone()];
@@ -127,7 +127,6 @@ impl Outcome {
 
     /// Everything of a diagnosis that is scored.
     fn of(found: &Diagnosis) -> Self {
-        let keyed = |id: &str, target: &str| crate::effect::EffectKey::new(id, target).to_string();
         Self {
             verdict: found.verdict,
             p_value: found.detection.p_value,
@@ -142,7 +141,7 @@ impl Outcome {
             target: found.location.target.clone(),
             effects: (found.cause.effects.iter())
                 .map(|e| NamedEffect {
-                    key: keyed(&e.id, &e.target),
+                    key: e.key(),
                     probability: e.probability,
                 })
                 .collect(),
@@ -216,10 +215,10 @@ impl Piece for TrueShare {
 
 impl TrueShare {
     /// Fits a trial's true effects, where they are listed ones. A fit that fails tells nothing.
-    pub(super) fn new(truth: &Truth, question: &Question<'_>) -> Self {
+    pub(super) fn new(truth: &Truth, question: &TrialQuestion<'_>) -> Self {
         let keys = &truth.effects;
         let is_listed = !keys.is_empty() && keys.len() == truth.departures.len();
-        let Question {
+        let TrialQuestion {
             study,
             record,
             validation,

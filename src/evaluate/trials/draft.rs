@@ -30,14 +30,14 @@ enum DraftLaw {
 
 impl Variant {
     /// The variants of a law that a truth is compared with, each of positive sign.
-    pub fn of(id: &str) -> Vec<Self> {
+    pub fn of(law: &ListedLaw) -> Vec<Self> {
         let with = |exponent, shape| Self {
             form: LawForm::Listed,
             sign: 1.0,
             exponent,
             shapes: [shape; 3],
         };
-        match id {
+        match law.id {
             "power-law" => EXPONENTS.map(|exponent| with(exponent, 0.5)).to_vec(),
             // The lower end of the range, and the upper one.
             "sensor-saturation" | "actuator-saturation" => vec![with(1.0, 0.0), with(1.0, 0.5)],
@@ -46,7 +46,7 @@ impl Variant {
     }
 
     /// Draws the shape of a law.
-    fn draw(law: &ListedLaw, form: LawForm, source: &mut Source) -> Self {
+    pub fn draw(law: &ListedLaw, form: LawForm, source: &mut Source) -> Self {
         let sign = if source.happens(0.5) { -1.0 } else { 1.0 };
         let shapes = [(); 3].map(|()| source.uniform());
         Self {
@@ -63,32 +63,19 @@ impl Variant {
 }
 
 impl Draft {
-    /// A listed law; its shape is drawn. `None` for an id that worlds do not have.
+    /// A listed law of a sign and a shape.
     pub fn listed(
-        id: &str,
-        place: DeparturePlace,
-        other: Option<usize>,
-        form: LawForm,
-        source: &mut Source,
-    ) -> Option<Self> {
-        let variant = Variant::draw(ListedLaw::named(id)?, form, source);
-        Self::variant(id, place, other, variant)
-    }
-
-    /// A listed law of a given sign and shape; `None` for an id that worlds do not have.
-    pub fn variant(
-        id: &str,
+        law: &'static ListedLaw,
         place: DeparturePlace,
         other: Option<usize>,
         variant: Variant,
-    ) -> Option<Self> {
-        let law = ListedLaw::named(id)?;
+    ) -> Self {
         let law = DraftLaw::Listed {
             law,
             other,
             variant,
         };
-        Some(Self { place, law })
+        Self { place, law }
     }
 
     /// A random law of a family at a place; `None` where nothing moves that it could depend on.

@@ -3,7 +3,7 @@
 use super::answer::TrueShare;
 use super::answer::{NamedEffect, Outcome, Refitted, Repeat, TrialAnswer};
 use super::row::TrialRow;
-use super::score::{Scorecard, Setup};
+use super::score::{Scorecard, TrialSetup};
 use super::truth::Truth;
 use super::world::Conditions;
 use super::{Kind, TrialSettings};
@@ -96,7 +96,7 @@ pub(crate) fn failed(kind: Kind, truth: &[&str]) -> TrialRow {
 }
 
 pub(crate) fn card(rows: Vec<TrialRow>) -> Scorecard {
-    let setup = Setup {
+    let setup = TrialSetup {
         twin: "twin".into(),
         settings: TrialSettings::default(),
         seal: "seal".into(),

@@ -28,15 +28,13 @@ use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::Study;
-use crate::twin::{Role, Twin};
+use crate::twin::{MOST_SUBSTEPS, Role, Twin};
 use nalgebra::DVector;
 
 /// Part of the weak prior that is kept: just enough for parameters that no record tells apart.
 const KNOWN: f64 = 1e-4;
 /// Substeps that stand for an exact step of the twin.
 const FINE: usize = 20;
-/// Most substeps that a twin can have.
-const MOST: usize = 1000;
 /// Iterations of a fit from the truth.
 const ITERATIONS: usize = 30;
 
@@ -239,7 +237,8 @@ impl Information {
 
     /// Nats by which the twin's own step shows: as a departure, against twenty times as many substeps. 0 for a black box.
     pub fn step(&self, study: &Study, system: System<'_>) -> Result<f64, FilterError> {
-        let fine = (study.twin()).stepped(|_, to| to.substeps = (FINE * to.substeps).min(MOST));
+        let fine =
+            (study.twin()).stepped(|_, to| to.substeps = (FINE * to.substeps).min(MOST_SUBSTEPS));
         let Some(fine) = fine else {
             return Ok(0.0);
         };

@@ -5,7 +5,7 @@
 use super::law::{
     DepartureLaw, DeparturePlace, ForceDeparture, ParameterDeparture, SignalDeparture, Wave,
 };
-use super::scene::{Scene, SignalExtent};
+use super::scene::Scene;
 use std::f64::consts::{PI, TAU};
 
 /// A law of the library as worlds have it.
@@ -84,32 +84,32 @@ static LAWS: [ListedLaw; 27] = [
     row("sensor-bias", Sign::Both, 3.0, |s| s.bias()),
     row("sensor-gain", Sign::Both, 3.0, |s| s.gain()),
     row("sensor-drift", Sign::Both, 3.0, |s| signal(SignalDeparture::Drift {
-        rate: 2.0 * s.signed() * s.range()?.deviation / s.scene.duration,
+        rate: 2.0 * s.signed() * s.scene.extent(s.place)?.deviation / s.scene.duration,
         levelling: s.is_other_form().then_some(2.0 * s.scene.duration),
     })),
     row("sensor-lag", Sign::Threshold, 3.0, |s| s.lag()),
     row("sensor-delay", Sign::Threshold, 3.0, |s| s.delay()),
     row("sensor-rectification", Sign::One, 0.9, |s| {
-        let range = s.range().filter(|range| range.low < 0.0)?;
+        let range = s.scene.extent(s.place).filter(|range| range.low < 0.0)?;
         signal(SignalDeparture::Rectification { fraction: s.size, rounding: s.soft(0.02 * range.span()) })
     }),
     row("sensor-saturation", Sign::Threshold, 0.9, |s| s.saturation()),
     row("sensor-quantization", Sign::Threshold, 3.0, |s| {
-        signal(SignalDeparture::Quantization { step: s.size * s.range()?.span(), half_way: s.is_other_form() })
+        signal(SignalDeparture::Quantization { step: s.size * s.scene.extent(s.place)?.span(), half_way: s.is_other_form() })
     }),
     row("actuator-gain", Sign::Both, 3.0, |s| s.gain()),
     row("actuator-bias", Sign::Both, 3.0, |s| s.bias()),
     row("actuator-dead-zone", Sign::Threshold, 3.0, |s| {
-        let span = s.range()?.span();
+        let span = s.scene.extent(s.place)?.span();
         signal(SignalDeparture::DeadZone { width: s.size * span, knee: s.soft(0.03 * s.size * span) })
     }),
     row("actuator-backlash", Sign::Threshold, 3.0, |s| {
-        signal(SignalDeparture::Play { width: s.size * s.range()?.span(), compliance: s.soft(0.1) })
+        signal(SignalDeparture::Play { width: s.size * s.scene.extent(s.place)?.span(), compliance: s.soft(0.1) })
     }),
     row("actuator-saturation", Sign::Threshold, 0.9, |s| s.saturation()),
     // At size 1 the whole range takes a tenth of the record.
     row("actuator-rate-limit", Sign::Threshold, 3.0, |s| {
-        let rate = 10.0 * s.range()?.span() / (s.size * s.scene.duration);
+        let rate = 10.0 * s.scene.extent(s.place)?.span() / (s.size * s.scene.duration);
         signal(SignalDeparture::RateLimit { rate, knee: s.soft(0.3) })
     }),
     row("actuator-lag", Sign::Threshold, 3.0, |s| s.lag()),
@@ -162,15 +162,6 @@ pub(super) struct Sizing<'s> {
 }
 
 impl Sizing<'_> {
-    /// Range of the signal at a sensor or an actuator.
-    fn range(&self) -> Option<SignalExtent> {
-        match self.place {
-            DeparturePlace::Sensor(j) => Some(self.scene.outputs[j]),
-            DeparturePlace::Actuator(j) => Some(self.scene.inputs[j]),
-            DeparturePlace::State(_) | DeparturePlace::Parameter(_) => None,
-        }
-    }
-
     fn state(&self) -> Option<usize> {
         match self.place {
             DeparturePlace::State(i) => Some(i),
@@ -227,7 +218,7 @@ impl Sizing<'_> {
 
     fn bias(&self) -> Option<DepartureLaw> {
         signal(SignalDeparture::Bias {
-            offset: self.signed() * self.range()?.deviation,
+            offset: self.signed() * self.scene.extent(self.place)?.deviation,
             settling: self.soft(0.02 * self.scene.duration),
         })
     }
@@ -254,7 +245,7 @@ impl Sizing<'_> {
     }
 
     fn saturation(&self) -> Option<DepartureLaw> {
-        let range = self.range()?;
+        let range = self.scene.extent(self.place)?;
         let (below, cut) = (self.variant.shapes[0] < 0.3, self.size * range.span());
         signal(SignalDeparture::Saturation {
             low: below.then_some(range.low + cut),

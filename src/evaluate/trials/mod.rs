@@ -51,5 +51,4 @@ pub(crate) use row::TrialRow;
 pub use run::{Sealed, Withheld};
 pub use score::Scorecard;
 pub(crate) use score::{Breakdown, BreakdownLine};
-pub(crate) use settings::MOST;
 pub use settings::{Kind, TrialSettings};

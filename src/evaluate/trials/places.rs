@@ -267,7 +267,7 @@ fn gain(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::trials::world::{RecordNoise, World};
+    use crate::evaluate::trials::world::{RecordNoise, equations};
     use crate::record::Drive;
     use crate::twin::{Noise, Outline, Parameter, StateSpace};
     use crate::twins::{CascadedTanks, VanDerPol};
@@ -277,19 +277,10 @@ mod tests {
         let levels = crate::record::Signal::from_shape_fn((80, inputs), |(k, _)| {
             1.0 + (0.2 * k as f64).sin()
         });
-        let world = World::new(&twin);
         let drive = Drive::new(0.1, levels).unwrap();
-        let scene = Scene::new(
-            &world,
-            theta,
-            &drive,
-            RecordNoise::of(Noise::new(1, "s", 0)),
-        )
-        .unwrap();
-        let World::Equations(twin) = &world else {
-            panic!("a black box");
-        };
-        Structure::of(twin, theta, &scene)
+        let scene =
+            Scene::new(&twin, theta, &drive, RecordNoise::of(Noise::new(1, "s", 0))).unwrap();
+        Structure::of(equations(&twin).unwrap(), theta, &scene)
     }
 
     /// k4 multiplies the pump's input, which enters the upper tank alone; k1 is that tank's, k2 and k3 the lower one's.

@@ -39,19 +39,7 @@ pub(crate) enum Fate {
 
 impl fmt::Display for Fate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Quiet => "quiet",
-            Self::FalseAlarm => "false alarm",
-            Self::Delivered => "delivered",
-            Self::Partial => "partial",
-            Self::Incomplete => "incomplete",
-            Self::InClass => "in class",
-            Self::WrongName => "wrong name",
-            Self::Refused => "refused",
-            Self::Abstained => "abstained",
-            Self::Missed => "missed",
-            Self::Failed => "failed",
-        })
+        self.serialize(f)
     }
 }
 

@@ -1,20 +1,19 @@
 //! The trials from end to end: sealed, diagnosed, opened, scored.
 
 use super::answer::TrueShare;
-use super::answer::{Question, TrialAnswer};
+use super::answer::{TrialAnswer, TrialQuestion};
 use super::correlation::correlated;
 use super::draft::index;
 use super::folder::{ANSWERS, Filling, Folder, SHARES, Which};
 use super::row::TrialRow;
-use super::score::Setup;
-use super::settings::MOST;
+use super::score::TrialSetup;
 use super::settings::assign_kinds;
 use super::steadiness::repeats;
 use super::truth::{Extra, Truth, TruthSampler};
 use super::{Kind, Scorecard, TrialSettings};
 use crate::diagnose::{DiagnoseSettings, greedy};
-use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::numbers::TRIAL;
+use crate::evaluate::{EvaluateError, MOST_RECORDS};
 use crate::likelihood::kalman::recoverable;
 use crate::progress::Progress;
 use crate::record::record_csv_text;
@@ -66,8 +65,13 @@ impl<'a> Withheld<'a> {
         if settings.trials == 0 {
             return Err(EvaluateError::Nothing("trials"));
         }
-        let limit = format!("choose at most {MOST}");
-        SettingError::unless(settings.trials <= MOST, "trials", settings.trials, limit)?;
+        let limit = format!("choose at most {MOST_RECORDS}");
+        SettingError::unless(
+            settings.trials <= MOST_RECORDS,
+            "trials",
+            settings.trials,
+            limit,
+        )?;
         if settings.kinds.is_empty() {
             return Err(EvaluateError::Nothing("kinds"));
         }
@@ -190,7 +194,7 @@ impl Sealed<'_> {
                 TrialRow::new(truth, answer, share, names, settings.without)
             })
             .collect();
-        let setup = Setup {
+        let setup = TrialSetup {
             twin: sampler.study().name().into(),
             settings: settings.clone(),
             seal: self.seal().into(),
@@ -247,7 +251,7 @@ impl Sealed<'_> {
         &self,
         trial: usize,
         without: Vec<String>,
-        act: impl FnOnce(&Question<'_>) -> Result<T, EvaluateError>,
+        act: impl FnOnce(&TrialQuestion<'_>) -> Result<T, EvaluateError>,
     ) -> Result<T, EvaluateError> {
         let own = &self.trials.settings;
         let noise = Noise::new(own.seed, "withheld diagnosis", trial as u64);
@@ -255,7 +259,7 @@ impl Sealed<'_> {
         let validation = (own.validation)
             .then(|| self.folder.record(trial, Which::Validation))
             .transpose()?;
-        act(&Question {
+        act(&TrialQuestion {
             study: self.trials.sampler.study(),
             record: &record,
             validation: validation.as_ref(),
@@ -273,7 +277,7 @@ impl Sealed<'_> {
     fn one(
         &self,
         trial: usize,
-        question: &Question<'_>,
+        question: &TrialQuestion<'_>,
         progress: &Progress,
     ) -> Result<TrialAnswer, EvaluateError> {
         let (study, record, own) = (question.study, question.record, &self.trials.settings);

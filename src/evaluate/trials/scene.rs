@@ -1,10 +1,11 @@
 //! Sizes of a twin's signals: one record of its world without departures.
 
 use super::law::{Argument, DeparturePlace, LawVariable, Moment};
-use super::world::{Conditions, RecordNoise, System, World, WorldRun};
+use super::world::{Conditions, RecordNoise, System, WorldRun, run};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::math::{deviation, ends};
 use crate::record::{Drive, Signal};
+use crate::twin::Twin;
 
 /// Range and spread of one signal.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +28,10 @@ impl SignalExtent {
             deviation: deviation(&present),
             rms: (square / present.len().max(1) as f64).sqrt(),
         }
+    }
+
+    fn ends(&self) -> (f64, f64) {
+        (self.low, self.high)
     }
 
     /// Width of the range.
@@ -57,9 +62,9 @@ fn sizes(signal: &Signal) -> Vec<SignalExtent> {
 
 impl Scene {
     /// Simulates the world at θ; `None` where it diverges.
-    pub fn new(world: &World, theta: &[f64], drive: &Drive, draws: RecordNoise) -> Option<Self> {
+    pub fn new(twin: &Twin, theta: &[f64], drive: &Drive, draws: RecordNoise) -> Option<Self> {
         let conditions = Conditions::declared();
-        let run = world.run(System::new(theta, &conditions), drive, draws)?;
+        let run = run(twin, System::new(theta, &conditions), drive, draws)?;
         Some(Self {
             states: sizes(&run.states),
             rates: sizes(&run.rates),
@@ -89,18 +94,11 @@ impl Scene {
 
     /// The signal that a variable stands for, standardised; `None` for one that does not move.
     pub fn argument(&self, variable: LawVariable, place: DeparturePlace) -> Option<Argument> {
-        let (low, high) = match (variable, place) {
-            (LawVariable::Time, _) => (0.0, self.duration),
-            (LawVariable::State(i), _) | (LawVariable::Own, DeparturePlace::State(i)) => {
-                (self.states[i].low, self.states[i].high)
-            }
-            (LawVariable::Input(j), _) | (LawVariable::Own, DeparturePlace::Actuator(j)) => {
-                (self.inputs[j].low, self.inputs[j].high)
-            }
-            (LawVariable::Own, DeparturePlace::Sensor(j)) => {
-                (self.outputs[j].low, self.outputs[j].high)
-            }
-            (LawVariable::Own, DeparturePlace::Parameter(_)) => return None,
+        let (low, high) = match variable {
+            LawVariable::Time => (0.0, self.duration),
+            LawVariable::State(i) => self.states[i].ends(),
+            LawVariable::Input(j) => self.inputs[j].ends(),
+            LawVariable::Own => self.extent(place)?.ends(),
         };
         let half_width = 0.5 * (high - low);
         (half_width > 0.0 && half_width.is_finite()).then_some(Argument {
@@ -108,6 +106,16 @@ impl Scene {
             centre: 0.5 * (low + high),
             half_width,
         })
+    }
+
+    /// Range of the signal at a place; none of a parameter.
+    pub fn extent(&self, place: DeparturePlace) -> Option<SignalExtent> {
+        match place {
+            DeparturePlace::State(i) => Some(self.states[i]),
+            DeparturePlace::Actuator(j) => Some(self.inputs[j]),
+            DeparturePlace::Sensor(j) => Some(self.outputs[j]),
+            DeparturePlace::Parameter(_) => None,
+        }
     }
 
     /// Variables that move at a place.

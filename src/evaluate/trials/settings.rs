@@ -6,9 +6,6 @@ use crate::record::Record;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Most trials of a folder; their keys are in memory.
-pub(crate) const MOST: usize = 1_000_000;
-
 /// Settings of sealed trials.
 ///
 /// | setting | default | meaning |

@@ -1,6 +1,6 @@
 //! The same question asked otherwise: an answer that depends on the asking is none.
 
-use super::answer::{Question, Repeat};
+use super::answer::{Repeat, TrialQuestion};
 use crate::diagnose::DiagnoseSettings;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::numbers::TRIAL;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// Answers under other seeds, from a record twice as long, in other units, and with the library in another order.
 pub(super) fn repeats(
-    question: &Question<'_>,
+    question: &TrialQuestion<'_>,
     doubled: Option<&Record>,
     progress: &Progress,
 ) -> Result<Vec<Repeat>, EvaluateError> {
@@ -21,13 +21,13 @@ pub(super) fn repeats(
         seed: own.seed.wrapping_add(seed),
         ..own.clone()
     });
-    let with = |settings| Question {
+    let with = |settings| TrialQuestion {
         settings,
         ..question.clone()
     };
-    let mut questions: Vec<(&str, Question<'_>)> = seeds.map(|s| ("seed", with(s))).collect();
+    let mut questions: Vec<(&str, TrialQuestion<'_>)> = seeds.map(|s| ("seed", with(s))).collect();
     if let Some(record) = doubled {
-        let longer = Question {
+        let longer = TrialQuestion {
             record,
             ..question.clone()
         };
@@ -35,7 +35,7 @@ pub(super) fn repeats(
     }
     let scaled = rescaled(study, question.record, question.validation)?;
     if let Some((study, record, validation)) = &scaled {
-        let scaled = Question {
+        let scaled = TrialQuestion {
             study,
             record,
             validation: validation.as_ref(),
@@ -46,7 +46,7 @@ pub(super) fn repeats(
     let kinds: Vec<_> = study.catalogue().kinds().iter().rev().cloned().collect();
     let kinds = kinds.iter().map(|kind| kind.as_ref().clone());
     let reordered = study.clone().with_effects(kinds);
-    let reordered = Question {
+    let reordered = TrialQuestion {
         study: &reordered,
         ..question.clone()
     };

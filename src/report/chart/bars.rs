@@ -1,17 +1,11 @@
 //! Horizontal bars with their names on the left, their numbers on the right, and a scale below.
 
 use super::axis::Ticks;
-use super::canvas::{BOLD, Canvas, EDGE, GRID, LINE, ROOM, TEXT, WIDTH, clipped, width};
+use super::canvas::{BOLD, Canvas, EDGE, GAP, GRID, LINE, ROOM, TEXT, WIDTH, clipped, width};
 
 /// Height of a row and of the bar inside it.
 const ROW: f64 = 25.0;
 const BAR: f64 = 15.0;
-/// Between name, bar and number.
-const GAP: f64 = 8.0;
-/// Most room for names.
-const NAMES: f64 = 0.46 * ROOM;
-/// Room for one tick of a scale.
-const TICK: f64 = 64.0;
 
 /// Bars under a heading.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +82,7 @@ impl Bar {
 pub fn bar_chart(title: &str, description: &str, groups: &[BarGroup]) -> String {
     let bars = || groups.iter().flat_map(|group| &group.bars);
     let widest = |needs: fn(&Bar) -> f64| bars().map(needs).fold(0.0, f64::max);
-    let names = widest(|bar| width(&bar.label, TEXT * BOLD)).min(NAMES);
+    let names = widest(|bar| width(&bar.label, TEXT * BOLD)).min(0.46 * ROOM);
     let notes = widest(|bar| width(&bar.note, TEXT));
     let left = EDGE + names + GAP;
     let right = (WIDTH - EDGE - notes - GAP).max(left + ROW);
@@ -150,7 +144,8 @@ impl Scale {
     /// Positions and labels of its ticks.
     fn ticks(&self) -> Vec<(f64, String)> {
         let unit = if self.per_cent { 100.0 } else { 1.0 };
-        let wanted = ((self.right - self.left) / TICK) as usize;
+        // Each tick has 64 units.
+        let wanted = ((self.right - self.left) / 64.0) as usize;
         let end = unit * self.full;
         if wanted == 0 || !(end > 0.0 && end.is_finite()) {
             return vec![];

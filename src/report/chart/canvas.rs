@@ -4,14 +4,14 @@ use std::fmt::Write;
 
 /// Width in user units: narrow, so that text is still legible on a phone.
 pub(super) const WIDTH: f64 = 520.0;
-/// Widest on a page, in CSS pixels.
-const LARGEST: u32 = 880;
 /// Distance of anything from the edge.
 pub(super) const EDGE: f64 = 12.0;
 /// Font sizes of the title and of everything else, and the height of a line of text.
 const TITLE: f64 = 17.0;
 pub(super) const TEXT: f64 = 14.0;
 pub(super) const LINE: f64 = 20.0;
+/// Between names and what they name.
+pub(super) const GAP: f64 = 8.0;
 /// Room for a text that has a row to itself.
 pub(super) const ROOM: f64 = WIDTH - 2.0 * EDGE;
 /// Width of a character over the font size, in the widest of common fonts.
@@ -86,7 +86,7 @@ impl Canvas {
     pub fn svg(self, height: f64) -> String {
         let Self { head, body } = self;
         format!(
-            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height:.0}" width="100%" style="max-width:{LARGEST}px;height:auto" role="img" font-family="system-ui, sans-serif" fill="#222222">
+            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height:.0}" width="100%" style="max-width:880px;height:auto" role="img" font-family="system-ui, sans-serif" fill="#222222">
 {head}<rect width="{WIDTH}" height="{height:.0}" fill="#ffffff"/>
 {body}</svg>
 "##

@@ -1,14 +1,12 @@
 //! Heat maps: rows of stretches of time.
 
 use super::axis::{Across, Ticks, padded};
-use super::canvas::{AXIS, BOLD, Canvas, EDGE, LINE, ROOM, TEXT, WIDTH, clipped, width};
+use super::canvas::{AXIS, BOLD, Canvas, EDGE, GAP, LINE, ROOM, TEXT, WIDTH, clipped, width};
 use super::panel::{Span, TimeMark};
 
 /// Height of a row and of the cells inside it.
 const ROW: f64 = 30.0;
 const CELL: f64 = 26.0;
-/// Between names and cells.
-const GAP: f64 = 8.0;
 /// Most room for names.
 const NAMES: f64 = 0.34 * ROOM;
 

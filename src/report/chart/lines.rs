@@ -15,8 +15,6 @@ const GAP: f64 = 16.0;
 /// Height of the strip of stretches, and its distance from the axis.
 const STRIP: f64 = 22.0;
 const BELOW: f64 = 5.0;
-/// Half the width of a whisker's end.
-const CAP: f64 = 4.0;
 const BAND: &str = r##"fill="#0072b2" fill-opacity="0.2""##;
 const POINT: &str = r##"fill="#0072b2" stroke="#ffffff""##;
 const WHISKER: &str = r##"fill="none" stroke="#222222" stroke-width="1.5""##;
@@ -245,7 +243,7 @@ fn whiskers(canvas: &mut Canvas, across: &Across, y: &impl Fn(f64) -> f64, dots:
     for dot in finite {
         let x = across.x(dot.x);
         let (low, high) = (y(dot.low), y(dot.high));
-        let (left, right) = (x - CAP, x + CAP);
+        let (left, right) = (x - 4.0, x + 4.0);
         canvas.path(
             &format!(
                 "M{left:.1} {low:.1}H{right:.1}M{x:.1} {low:.1}V{high:.1}M{left:.1} {high:.1}H{right:.1}"

@@ -4,9 +4,6 @@ use super::axis::{Across, padded};
 use super::canvas::{BOLD, Canvas, TEXT, width};
 use std::ops::RangeInclusive;
 
-/// Opacity of a stretch of full weight: text on it must stay legible.
-const DENSEST: f64 = 0.55;
-
 /// One pair of axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
@@ -164,12 +161,8 @@ impl Style {
 
     /// Attributes of the line.
     pub(super) fn stroke(self) -> String {
-        let Self {
-            colour,
-            width,
-            dash,
-        } = self;
-        let dash = match dash {
+        let (colour, width) = (self.colour, self.width);
+        let dash = match self.dash {
             "" => String::new(),
             dash => format!(r#" stroke-dasharray="{dash}""#),
         };
@@ -250,7 +243,8 @@ impl Span {
     /// Draws a cell so high below `top`.
     pub(super) fn draw(&self, canvas: &mut Canvas, across: &Across, top: f64, height: f64) {
         let (from, to) = (across.x(self.from) + 1.0, across.x(self.to) - 1.0);
-        let opacity = DENSEST * self.weight.clamp(0.0, 1.0);
+        // Text on a stretch of full weight must stay legible.
+        let opacity = 0.55 * self.weight.clamp(0.0, 1.0);
         let (stroke, bold) = match self.clear {
             true => (r##" stroke="#222222""##, BOLD),
             false => ("", 1.0),

@@ -4,7 +4,7 @@
 //! inside their own frames, which the keyboard reaches too; what is secondary is folded, and unfolded in print. There are no
 //! scripts, and nothing is loaded from elsewhere.
 
-use super::{Block, Column, Document, Matrix, Picture, Section, Shade, Table, escaped};
+use super::{Block, Column, Document, Matrix, Picture, Section, Shade, TableBlock, escaped};
 
 /// Colours have a contrast of at least 4.5 to 1.
 const STYLE: &str = include_str!("page.css");
@@ -136,7 +136,7 @@ impl Picture {
     }
 }
 
-impl Table {
+impl TableBlock {
     fn html(&self, heading: &str) -> String {
         let class = |kind: Column| match kind {
             Column::Text => "",

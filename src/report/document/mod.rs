@@ -51,7 +51,7 @@ pub(crate) enum Block {
     Code(String),
     /// Reasons to doubt the result.
     Doubts(Vec<Warning>),
-    Table(Table),
+    Table(TableBlock),
     /// A table of shaded cells; pages only.
     Matrix(Matrix),
     /// Pages only.
@@ -62,7 +62,7 @@ pub(crate) enum Block {
 
 /// A table; the first cell of a row names it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Table {
+pub(crate) struct TableBlock {
     /// Empty where the heading above says it.
     pub caption: String,
     pub head: Vec<(String, Column)>,
@@ -142,7 +142,7 @@ impl Block {
         rows: Vec<Vec<String>>,
     ) -> Self {
         let head = head.iter().map(|(name, kind)| ((*name).to_owned(), *kind));
-        Self::Table(Table {
+        Self::Table(TableBlock {
             caption: caption.into(),
             head: head.collect(),
             rows,

@@ -1,6 +1,6 @@
 //! Documents on the terminal.
 
-use super::{Block, Column, Document, Table};
+use super::{Block, Column, Document, TableBlock};
 
 /// Columns of a line of text; a table may be wider.
 const COLUMNS: usize = 100;
@@ -42,7 +42,7 @@ impl Block {
     }
 }
 
-impl Table {
+impl TableBlock {
     /// Caption, head and rows as lines.
     pub fn text(&self) -> String {
         let head: Vec<String> = self.head.iter().map(|(name, _)| name.clone()).collect();

@@ -9,7 +9,7 @@ use super::document::{Block, Document, Picture, Section};
 use super::fit::draws;
 use super::parameters::{ParameterRow, priors, values};
 use super::record::overlay_svg;
-use super::residuals::{Left, residual_blocks};
+use super::residuals::residual_blocks;
 use crate::estimator::{Estimate, GateOutcome, INTERVAL_LEVEL};
 use crate::math::three_digits;
 use crate::record::Record;
@@ -66,9 +66,8 @@ pub(super) fn estimate_document(
     ];
     sections.extend(estimate.posterior.as_ref().map(|p| draws(study, p)));
     if let (Some(record), Some(after)) = (record, after) {
-        let outputs = &(record.outputs() - after);
-        let inputs = record.drive().inputs();
-        let blocks = residual_blocks(study, "record − twin", false, &[Left { inputs, outputs }]);
+        let left = (record.drive().inputs(), &(record.outputs() - after));
+        let blocks = residual_blocks(study, "record − twin", false, &[left]);
         sections.push(Section::new("residuals", "Residuals", blocks));
     }
     Document {

@@ -73,14 +73,8 @@ pub(crate) fn together_document(study: &Study, all: &Together, files: &[String])
                 with_error(estimate.theta[j], estimate.std_error[j]).join(" ± ")
             })
         }));
-        row.push(
-            if estimate.is_consistent() {
-                "yes"
-            } else {
-                "no"
-            }
-            .into(),
-        );
+        let consistent = ["no", "yes"][usize::from(estimate.is_consistent())];
+        row.push(consistent.into());
         each.push(row);
         doubts.extend(estimate.warnings.iter().map(|w| Warning {
             what: format!("{file}: {}", w.what),

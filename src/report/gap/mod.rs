@@ -139,10 +139,7 @@ fn parameters(units: &Units, diagnosis: &Diagnosis) -> Section {
 /// Residuals of the accepted twin, folded.
 fn residuals(study: &Study, diagnosis: &Diagnosis) -> Option<Section> {
     let all: Vec<Left<'_>> = (diagnosis.residuals.iter())
-        .map(|r| Left {
-            inputs: r.drive().inputs(),
-            outputs: r.outputs(),
-        })
+        .map(|r| (r.drive().inputs(), r.outputs()))
         .collect();
     if all.is_empty() {
         return None;

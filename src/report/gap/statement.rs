@@ -1,7 +1,7 @@
 //! The answer in words: headline, what follows from it, what to do next. All of it follows from verdict, decision and probabilities.
 
 use super::extent::share_with_interval;
-use super::words::{effect, effects, few, joined};
+use super::words::{MOST_NAMES, effect, effects, few, joined};
 use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, Verdict};
 use crate::report::NEXT_INPUT;
 use crate::report::digits::{chance, percent, short, with_unit};
@@ -10,8 +10,6 @@ use crate::twin::Integrator;
 
 /// Characters of a headline: two lines of a page.
 const LONGEST: usize = 140;
-/// Names in one sentence.
-const MOST_NAMES: usize = 3;
 /// Probability from which a name is stated.
 pub(super) const SAID: f64 = 0.5;
 /// Probability that nothing is missing below which *no gap* is said with a reservation.

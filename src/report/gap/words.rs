@@ -4,7 +4,7 @@ use crate::effect::EffectKey;
 use crate::report::units::Units;
 
 /// Names in one sentence.
-const MOST_NAMES: usize = 3;
+pub(super) const MOST_NAMES: usize = 3;
 /// Kinds of target that an id may begin with: the place says them again.
 const KINDS: [&str; 4] = ["sensor-", "actuator-", "state-", "parameter-"];
 /// Last words of nouns that take no article.

@@ -12,17 +12,17 @@ use crate::twin::Parameter;
 /// Which methods a panel shows.
 type Belongs = fn(ScoredMethod) -> bool;
 
+fn is_two_stage(method: ScoredMethod) -> bool {
+    use ScoredMethod::{Final, TsFine, TsPre};
+    matches!(method, TsPre | TsFine | Final)
+}
+
 /// The paper's trajectory figure: noise-free runs of the twin at the truth and, as means over the records, at the
 /// answers of each family of methods. `None` where the twin diverges at the truth.
 pub fn mean_runs_svg(study: &Study, means: &MeanRuns) -> Option<String> {
     let truth = means.truth.as_ref()?;
     let families: [(&str, Belongs); 3] = [
-        ("Two-Stage", |m| {
-            matches!(
-                m,
-                ScoredMethod::TsPre | ScoredMethod::TsFine | ScoredMethod::Final
-            )
-        }),
+        ("Two-Stage", is_two_stage),
         ("PEM", |m| matches!(m, ScoredMethod::PredictionError(_))),
         ("dual-EKF", |m| matches!(m, ScoredMethod::DualFilter(_))),
     ];
@@ -57,18 +57,12 @@ pub fn first_run_svg(study: &Study, runs: &AnswerRuns) -> String {
     let drive = runs.record.drive();
     let times: Vec<f64> = (0..drive.samples()).map(|k| drive.time(k)).collect();
     let outputs = study.twin().signals().outputs;
-    let ours: Belongs = |m| {
-        matches!(
-            m,
-            ScoredMethod::TsPre | ScoredMethod::TsFine | ScoredMethod::Final
-        )
-    };
     let theirs: Belongs = |m| matches!(m, ScoredMethod::PredictionError(start) | ScoredMethod::DualFilter(start) if start == Bad);
     let panels = (outputs.iter().enumerate())
         .flat_map(|(channel, quantity)| {
             let measured = Trajectory("measured".into(), Style::RECORD, runs.record.outputs());
             let of = |belongs: Belongs| lines(&runs.answers, belongs, |method| method.to_string());
-            let (ours, theirs) = (of(ours), of(theirs));
+            let (ours, theirs) = (of(is_two_stage), of(theirs));
             [("Two-Stage", ours), ("bad starts", theirs)]
                 .into_iter()
                 .filter(|(_, lines)| !lines.is_empty())
@@ -122,9 +116,6 @@ fn panel(
 
 /// Parameters that are drawn: more panels are a roll, not a picture.
 const SHOWN: usize = 6;
-/// Heights of the two panels of a parameter.
-const COVERAGE: f64 = 150.0;
-const ERROR: f64 = 110.0;
 
 /// For each parameter, over its true value: the share of intervals that held it, with its 95 % interval, and the root mean square
 /// error of the refitted estimate. Bars below the axes mark the prior. `None` without a grid.
@@ -161,14 +152,14 @@ pub fn coverage_svg(study: &Study, points: &[PointScore]) -> Option<String> {
             });
             let x = format!("true {}{}", parameter.name, in_unit(&parameter.unit));
             let share = over_bounds(parameter, "share held", ("nominal", INTERVAL_LEVEL))
-                .height(COVERAGE)
+                .height(150.0)
                 .range(0.0, 1.0)
                 .dots(Dots {
                     label: "records at one θ, 95 % interval".into(),
                     points: shares,
                 });
             let error = over_bounds(parameter, "rms error", ("", 0.0))
-                .height(ERROR)
+                .height(110.0)
                 .dots(Dots {
                     label: String::new(),
                     points: errors,

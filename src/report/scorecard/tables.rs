@@ -149,7 +149,7 @@ pub(super) fn trials(card: &Scorecard) -> Block {
             or_dash(row.truth.rival.as_ref().map(|rival| rival.nats)),
             row.answer_text(),
             stated.map_or("–".into(), |p| format!("{p:.2}")),
-            row.fate().to_string(),
+            row.fate().to_string().replace('-', " "),
         ]
     };
     let head = [

@@ -3,6 +3,8 @@
 use super::functions::{Tree, Waves};
 use super::{DeparturePlace, Moment};
 use crate::twin::{Noise, Source};
+use serde::de::IntoDeserializer;
+use serde::de::value::Error as ValueError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -56,17 +58,9 @@ impl LawFamily {
 
 impl fmt::Display for LawFamily {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let shape = match self.shape {
-            LawShape::Smooth => "smooth",
-            LawShape::Kinked => "kinked",
-            LawShape::Hysteretic => "hysteretic",
-            LawShape::Memory => "memory",
-        };
-        let generator = match self.generator {
-            Generator::Tree => "tree",
-            Generator::Process => "process",
-        };
-        write!(f, "{shape}-{generator}")
+        self.shape.serialize(&mut *f)?;
+        f.write_str("-")?;
+        self.generator.serialize(f)
     }
 }
 
@@ -236,11 +230,7 @@ pub enum Families {
 
 impl fmt::Display for Families {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Open => "open",
-            Self::Closed => "closed",
-            Self::All => "all",
-        })
+        self.serialize(f)
     }
 }
 
@@ -248,10 +238,8 @@ impl FromStr for Families {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        [Self::Open, Self::Closed, Self::All]
-            .into_iter()
-            .find(|families| families.to_string() == text)
-            .ok_or_else(|| format!("{text} is none of open, closed, all"))
+        Self::deserialize(text.into_deserializer())
+            .map_err(|_: ValueError| format!("{text} is none of open, closed, all"))
     }
 }
 

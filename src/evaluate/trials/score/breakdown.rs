@@ -1,6 +1,6 @@
 //! Statistics by information, kind, nuisance, stated probability, repetition; truths against answers; simple answers to the same trials.
 
-use super::statistics::{BY_KIND, BY_NATS, BY_NUISANCE, Statistic};
+use super::statistics::{BY_KIND, BY_NATS, BY_NUISANCE, Cases, Statistic};
 use crate::effect::EffectKey;
 use crate::evaluate::Count;
 use crate::evaluate::trials::Kind;
@@ -77,13 +77,13 @@ pub(super) fn breakdowns(rows: &[TrialRow]) -> Vec<Breakdown> {
 /// One line a group of rows; groups without rows are left out.
 fn grouped<'r>(
     key: &'static str,
-    statistics: &'static [Statistic],
+    statistics: &'static [Statistic<Cases>],
     groups: impl Iterator<Item = (Value, Vec<&'r TrialRow>)>,
 ) -> Breakdown {
     let lines = groups
         .filter(|(_, rows)| !rows.is_empty())
         .map(|(labels, rows)| {
-            let count = |statistic: &Statistic| Some(statistic.over(rows.iter().copied()));
+            let count = |s: &Statistic<Cases>| Some(rows.iter().copied().map(s.value).sum());
             BreakdownLine::new(labels, statistics.iter().map(count))
         });
     Breakdown {

@@ -9,11 +9,11 @@ use super::TrialSettings;
 use super::row::TrialRow;
 use crate::evaluate::Count;
 use serde_json::Value;
-use statistics::{FIGURES, SCORES};
+use statistics::{FIGURES, SCORES, Statistic};
 
 /// Origin of a scorecard.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Setup {
+pub(crate) struct TrialSetup {
     pub twin: String,
     pub settings: TrialSettings,
     /// SHA-256 of the key file.
@@ -25,42 +25,28 @@ pub(crate) struct Setup {
 pub struct Scorecard {
     /// Number of trials.
     pub trials: usize,
-    pub(crate) setup: Setup,
+    pub(crate) setup: TrialSetup,
     /// Counts over all trials.
-    pub(crate) scores: Vec<ScoreValue<Count>>,
+    pub(crate) scores: Vec<Statistic<Count>>,
     /// Other numbers over all trials; null of nothing.
-    pub(crate) figures: Vec<ScoreValue<Value>>,
+    pub(crate) figures: Vec<Statistic<Value>>,
     /// Counts by groups of trials.
     pub(crate) breakdowns: Vec<Breakdown>,
     pub(crate) rows: Vec<TrialRow>,
 }
 
-/// A value with its path in the JSON and its name in reports.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ScoreValue<T> {
-    pub key: &'static str,
-    pub words: &'static str,
-    pub value: T,
-}
-
 impl Scorecard {
     /// Scores of these trials.
-    pub(crate) fn new(setup: Setup, rows: Vec<TrialRow>) -> Self {
-        let score = |s: &'static statistics::Statistic| ScoreValue {
-            key: s.key,
-            words: s.words,
-            value: s.over(&rows),
-        };
-        let figure = |f: &'static statistics::Figure| ScoreValue {
-            key: f.key,
-            words: f.words,
-            value: (f.value)(&rows),
-        };
+    pub(crate) fn new(setup: TrialSetup, rows: Vec<TrialRow>) -> Self {
         Self {
             trials: rows.len(),
             setup,
-            scores: SCORES.iter().map(score).collect(),
-            figures: FIGURES.iter().map(figure).collect(),
+            scores: (SCORES.iter())
+                .map(|score| score.with(rows.iter().map(score.value).sum()))
+                .collect(),
+            figures: (FIGURES.iter())
+                .map(|figure| figure.with((figure.value)(&rows)))
+                .collect(),
             breakdowns: breakdown::breakdowns(&rows),
             rows,
         }

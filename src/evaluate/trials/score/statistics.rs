@@ -12,44 +12,40 @@ use serde_json::{Value, json};
 /// Range of a share that is reported beside a right effect.
 const WITHIN: std::ops::RangeInclusive<f64> = -0.1..=1.1;
 
-/// A count over trials.
-pub(crate) struct Statistic {
+/// A value over trials, or the way to it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Statistic<V> {
     /// Path in the JSON.
     pub key: &'static str,
-    /// Name in reports; empty for one that only the JSON has.
+    /// Name in reports, with the unit; empty for one that only the JSON has.
     pub words: &'static str,
-    /// The cases of one trial: mostly the trial itself, where it is among those that the statistic is of.
-    pub cases: fn(&TrialRow) -> Count,
+    pub value: V,
 }
 
-impl Statistic {
-    /// Sums over trials.
-    pub fn over<'r>(&self, rows: impl IntoIterator<Item = &'r TrialRow>) -> Count {
-        rows.into_iter().map(self.cases).sum()
+impl<V> Statistic<V> {
+    /// The same of another value.
+    pub fn with<W>(&self, value: W) -> Statistic<W> {
+        let (key, words) = (self.key, self.words);
+        Statistic { key, words, value }
     }
 }
 
-/// A number over all trials.
-pub(crate) struct Figure {
-    /// Path in the JSON.
-    pub key: &'static str,
-    /// Name in reports, with the unit.
-    pub words: &'static str,
-    /// The number; null of nothing.
-    pub value: fn(&[TrialRow]) -> Value,
+/// The cases of one trial: mostly the trial itself, where it is among those that a count is of.
+pub(super) type Cases = fn(&TrialRow) -> Count;
+/// A number over all trials; null of nothing.
+type Figure = fn(&[TrialRow]) -> Value;
+
+const fn count(key: &'static str, words: &'static str, value: Cases) -> Statistic<Cases> {
+    Statistic { key, words, value }
 }
 
-const fn count(key: &'static str, words: &'static str, cases: fn(&TrialRow) -> Count) -> Statistic {
-    Statistic { key, words, cases }
-}
-
-const fn figure(key: &'static str, words: &'static str, value: fn(&[TrialRow]) -> Value) -> Figure {
-    Figure { key, words, value }
+const fn figure(key: &'static str, words: &'static str, value: Figure) -> Statistic<Figure> {
+    Statistic { key, words, value }
 }
 
 /// Statistics of all trials. docs/withheld.md defines each.
 #[rustfmt::skip] // One row a statistic.
-pub(super) const SCORES: &[Statistic] = &[
+pub(super) const SCORES: &[Statistic<Cases>] = &[
     count("false_alarms", "nothing missing: gap stated", false_alarm),
     count("nulls_failed", "nothing missing: diagnosis failed", |r| case(r.is_fine_null(), !r.answered())),
     count("coarse_called_structural", "nothing missing but a finer step: gap stated", |r| case(r.is_coarse_null() && r.answered(), r.called())),
@@ -83,7 +79,7 @@ pub(super) const SCORES: &[Statistic] = &[
 
 /// Statistics of the trials of about as many nats.
 #[rustfmt::skip] // One row a statistic.
-pub(super) const BY_NATS: &[Statistic] = &[
+pub(super) const BY_NATS: &[Statistic<Cases>] = &[
     count("called_structural", "gap stated", called),
     count("delivered", "delivered", |r| fate(r, Fate::Delivered)),
     count("partial", "partial", |r| fate(r, Fate::Partial)),
@@ -101,7 +97,7 @@ pub(super) const BY_NATS: &[Statistic] = &[
 ];
 
 /// Statistics of the trials of one kind.
-pub(super) const BY_KIND: &[Statistic] = &[
+pub(super) const BY_KIND: &[Statistic<Cases>] = &[
     count("called_structural", "gap stated", called),
     count("right", "right", |r| {
         case(true, matches!(r.fate(), Fate::Delivered | Fate::Quiet))
@@ -110,7 +106,7 @@ pub(super) const BY_KIND: &[Statistic] = &[
 ];
 
 /// Statistics of the trials under one nuisance.
-pub(super) const BY_NUISANCE: &[Statistic] = &[
+pub(super) const BY_NUISANCE: &[Statistic<Cases>] = &[
     count("false_alarms", "nothing missing: gap stated", false_alarm),
     count("delivered", "something missing: delivered", |r| {
         case(!r.is_null(), r.fate() == Fate::Delivered)
@@ -119,7 +115,7 @@ pub(super) const BY_NUISANCE: &[Statistic] = &[
 
 /// Numbers over all trials. docs/withheld.md defines each.
 #[rustfmt::skip] // One row a figure.
-pub(super) const FIGURES: &[Figure] = &[
+pub(super) const FIGURES: &[Statistic<Figure>] = &[
     figure("probabilities.trials", "Gaps with stated probabilities", |rows| json!(rows.iter().filter_map(log_score).count())),
     figure("probabilities.log_score", "Mean log score of the truth, nats", |rows| mean(rows, log_score)),
     figure("probabilities.brier", "Mean Brier score", |rows| mean(rows, brier)),

@@ -102,7 +102,7 @@ impl Comparison<'_> {
         // Shapes that look alike in small differ at the size that it takes.
         let mut best: Option<Screened> = None;
         let (share, nats) = PROMISES;
-        for variant in Variant::of(&effect.id) {
+        for variant in Variant::of(effect.law) {
             let Some(mut screened) = self.screened(effect, variant)? else {
                 continue;
             };
@@ -129,30 +129,23 @@ impl Comparison<'_> {
         variant: Variant,
     ) -> Result<Option<Screened>, EvaluateError> {
         let (experiment, information) = (self.experiment, &self.experiment.information);
-        let draft = |variant| Draft::variant(&effect.id, effect.place, effect.other, variant);
-        let Some(positive) = draft(variant) else {
-            return Ok(None);
-        };
-        let Some(small) = experiment.changed(&positive, FIRST)? else {
+        let Some(small) = experiment.changed(&effect.draft(variant), FIRST)? else {
             return Ok(None);
         };
         let nats = information.nats(&small);
         let small = information.matched(&self.sized.change, &small);
-        let signs = ListedLaw::named(&effect.id).map_or(Sign::One, |law| law.sign);
-        let sign = match signs.is_both() {
+        let sign = match effect.law.sign.is_both() {
             true => small.multiple.signum(),
             false => 1.0,
         };
-        let Some(draft) = draft(Variant { sign, ..variant }) else {
-            return Ok(None);
-        };
+        let draft = effect.draft(Variant { sign, ..variant });
         let largest = draft.largest();
         let mut best = Screened {
             draft,
             size: FIRST * sign * small.multiple,
             left: small.unexplained,
         };
-        if signs == Sign::Threshold || (best.size > 0.0 && best.left < UNLIKE) {
+        if effect.law.sign == Sign::Threshold || (best.size > 0.0 && best.left < UNLIKE) {
             // An end of a range, a play, a level at its limit: the size at which the effect changes as much as the departure does.
             let same = match nats > 0.0 {
                 true => FIRST * (information.nats(&self.sized.change) / nats).sqrt(),
@@ -212,7 +205,7 @@ mod tests;
 /// An effect of the study's library, as a law of the world.
 pub(super) struct Listed {
     pub key: String,
-    pub id: String,
+    pub law: &'static ListedLaw,
     pub place: DeparturePlace,
     /// The other state of a law between two.
     pub other: Option<usize>,
@@ -223,15 +216,19 @@ impl Listed {
     pub fn all(study: &Study, places: &TwinPlaces) -> Vec<Self> {
         let state = |name: &str| places.states.iter().position(|s| s == name);
         (study.candidates().iter())
-            .filter(|effect| ListedLaw::named(effect.id()).is_some())
             .filter_map(|effect| {
                 Some(Self {
                     key: effect.key().to_string(),
-                    id: effect.id().into(),
+                    law: ListedLaw::named(effect.id())?,
                     place: places.find(effect.id(), effect.target())?,
                     other: effect.other().and_then(state),
                 })
             })
             .collect()
+    }
+
+    /// A departure of this law, of a sign and a shape.
+    pub fn draft(&self, variant: Variant) -> Draft {
+        Draft::listed(self.law, self.place, self.other, variant)
     }
 }

@@ -8,11 +8,11 @@ use super::sizing::Experiment;
 use super::{DrawEnd, Reject};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::{Draft, index};
-use crate::evaluate::trials::listed::LawForm;
+use crate::evaluate::trials::listed::{LawForm, Variant};
 use crate::evaluate::trials::places::Structure;
 use crate::evaluate::trials::places::TwinPlaces;
 use crate::evaluate::trials::scene::Scene;
-use crate::evaluate::trials::world::{Conditions, RecordNoise, System, World};
+use crate::evaluate::trials::world::{Conditions, RecordNoise, System, equations, run};
 use crate::evaluate::trials::{Families, Kind};
 use crate::record::{Drive, Record, Signal};
 use crate::study::{DriveSource, Study};
@@ -50,7 +50,6 @@ pub(in crate::evaluate::trials) struct Extra {
 /// Source of truths and their records.
 pub(in crate::evaluate::trials) struct TruthSampler<'a> {
     study: &'a Study,
-    world: World,
     places: TwinPlaces,
     space: ParameterSpace,
     plan: Plan,
@@ -77,7 +76,6 @@ impl<'a> TruthSampler<'a> {
         };
         let mut sampler = Self {
             study,
-            world: World::new(twin),
             space: twin.parameters(),
             listed: Listed::all(study, &places),
             places,
@@ -98,7 +96,7 @@ impl<'a> TruthSampler<'a> {
         let drive = self.drive(noise)?;
         let outputs = |i: u64| {
             let draws = RecordNoise::of(noise.sample(i));
-            Some(self.world.run(system, &drive, draws)?.outputs)
+            Some(run(self.study.twin(), system, &drive, draws)?.outputs)
         };
         Ok(matches!((outputs(0), outputs(1)), (Some(a), Some(b)) if a == b))
     }
@@ -166,16 +164,16 @@ impl<'a> TruthSampler<'a> {
         let source = &mut noise.source("truth");
         let theta = theta(kind, &self.space, self.space.draw_prior(noise), source);
         let drive = self.drive(noise)?;
-        let scene = Scene::new(&self.world, &theta, &drive, RecordNoise::of(noise));
+        let scene = Scene::new(self.study.twin(), &theta, &drive, RecordNoise::of(noise));
         let scene = scene.ok_or(Reject::Diverged)?;
         if scene.is_still() {
             return Err(Reject::Still.into());
         }
-        let is_noisy = self.is_silent || !self.world.is_black_box();
+        let is_noisy = self.is_silent || equations(self.study.twin()).is_some();
         let allowed = nuisances(&scene, is_noisy);
         let conditions = conditions(&scene, self.is_silent, &allowed, source);
         let system = System::new(&theta, &conditions);
-        let experiment = Experiment::new(self.study, &self.world, system, &scene)?;
+        let experiment = Experiment::new(self.study, system, &scene)?;
         let mut truth = Truth {
             trial,
             kind,
@@ -262,7 +260,7 @@ impl<'a> TruthSampler<'a> {
         };
         let listed = |among: &[&Listed], source: &mut Source| {
             let chosen = *among.get(index(source, among.len().max(1)))?;
-            let draft = Draft::listed(&chosen.id, chosen.place, chosen.other, form, source)?;
+            let draft = chosen.draft(Variant::draw(chosen.law, form, source));
             draft.of_size(0.1, scene)?;
             Some((draft, Some(chosen.key.clone())))
         };
@@ -290,7 +288,7 @@ impl<'a> TruthSampler<'a> {
     /// Places of the departures, and those that mean the same by the structure of the equations.
     fn true_places(&self, truth: &Truth, scene: &Scene) -> Vec<String> {
         let mut all = truth.targets.clone();
-        if let World::Equations(twin) = &self.world {
+        if let Some(twin) = equations(self.study.twin()) {
             let structure = Structure::of(twin, &truth.theta, scene);
             for departure in &truth.departures {
                 let same = structure.same_as(departure.place).into_iter();
@@ -311,7 +309,7 @@ impl<'a> TruthSampler<'a> {
             departures: &truth.departures,
             conditions: &truth.conditions,
         };
-        let run = self.world.run(system, drive, RecordNoise::of(noise))?;
+        let run = run(self.study.twin(), system, drive, RecordNoise::of(noise))?;
         if !scene.is_near(&run) {
             return None;
         }

@@ -6,9 +6,10 @@ use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::information::{Information, InnovationChange};
 use crate::evaluate::trials::law::Departure;
 use crate::evaluate::trials::scene::Scene;
-use crate::evaluate::trials::world::{RecordNoise, System, World};
+use crate::evaluate::trials::world::{RecordNoise, System, run};
 use crate::record::Record;
 use crate::study::Study;
+use crate::twin::Twin;
 
 /// First size that is tried: small.
 pub(super) const FIRST: f64 = 0.03;
@@ -26,7 +27,7 @@ const OWN: f64 = 0.1;
 
 /// The system of a trial without its departures, and the filter that measures what departures change.
 pub(super) struct Experiment<'a> {
-    world: &'a World,
+    twin: &'a Twin,
     system: System<'a>,
     pub scene: &'a Scene,
     pub information: Information,
@@ -40,27 +41,22 @@ pub(super) struct Sized {
 }
 
 /// The record of a system near a scene, with its inputs; `None` where it diverges.
-fn record(world: &World, system: System<'_>, scene: &Scene, draws: RecordNoise) -> Option<Record> {
-    let run = world.run(system, &scene.run.drive, draws)?;
+fn record(twin: &Twin, system: System<'_>, scene: &Scene, draws: RecordNoise) -> Option<Record> {
+    let run = run(twin, system, &scene.run.drive, draws)?;
     let is_near = scene.is_near(&run);
     Record::new(run.drive, run.outputs).ok().filter(|_| is_near)
 }
 
 impl<'a> Experiment<'a> {
     /// Filters records of the system without departures.
-    pub fn new(
-        study: &Study,
-        world: &'a World,
-        system: System<'a>,
-        scene: &'a Scene,
-    ) -> Result<Self, DrawEnd> {
-        let draws = scene.draws;
-        let record = |draws| record(world, system, scene, draws).ok_or(Reject::Diverged);
+    pub fn new(study: &'a Study, system: System<'a>, scene: &'a Scene) -> Result<Self, DrawEnd> {
+        let (twin, draws) = (study.twin(), scene.draws);
+        let record = |draws| record(twin, system, scene, draws).ok_or(Reject::Diverged);
         let (again, mirrored) = (draws.remeasured(), draws.mirrored());
         let plain = [record(draws)?, record(again)?, record(mirrored)?];
         let information = Information::new(study, system, &plain)?.ok_or(Reject::NoFilter)?;
         Ok(Self {
-            world,
+            twin,
             system,
             scene,
             information,
@@ -72,7 +68,7 @@ impl<'a> Experiment<'a> {
             departures,
             ..self.system
         };
-        record(self.world, system, self.scene, draws)
+        record(self.twin, system, self.scene, draws)
     }
 
     /// The record with these departures, and once more with other measurement noise; `None` where one diverges.

@@ -28,15 +28,7 @@ pub(in crate::evaluate::trials) enum NuisanceKind {
 
 impl fmt::Display for NuisanceKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::None => "none",
-            Self::Level => "level",
-            Self::Coloured => "coloured",
-            Self::HeavyTailed => "heavy-tailed",
-            Self::Start => "start",
-            Self::ClosedLoop => "closed-loop",
-            Self::Gaps => "gaps",
-        })
+        self.serialize(f)
     }
 }
 

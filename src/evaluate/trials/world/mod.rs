@@ -11,14 +11,7 @@ pub(super) use conditions::{Conditions, Feedback, NuisanceKind};
 
 use super::law::Departure;
 use crate::record::{Drive, Signal};
-use crate::twin::{Composed, ComposedBlackBox, Noise, Twin};
-
-/// A twin that records are made with.
-#[derive(Clone)]
-pub(super) enum World {
-    Equations(Composed),
-    BlackBox(ComposedBlackBox),
-}
+use crate::twin::{Composed, Noise, Twin};
 
 /// The truth of one record.
 #[derive(Debug, Clone, Copy)]
@@ -90,25 +83,20 @@ pub(super) struct WorldRun {
     pub rates: Signal,
 }
 
-impl World {
-    /// The world of a twin.
-    pub fn new(twin: &Twin) -> Self {
-        match twin {
-            Twin::Equations(twin) => Self::Equations(twin.clone()),
-            Twin::BlackBox(twin) => Self::BlackBox(twin.clone()),
-        }
-    }
+/// The equations of a twin; none of a simulator.
+pub(super) fn equations(twin: &Twin) -> Option<&Composed> {
+    twin.equations()
+}
 
-    /// Returns true for a simulator without equations.
-    pub fn is_black_box(&self) -> bool {
-        matches!(self, Self::BlackBox(_))
-    }
-
-    /// Makes a record; `None` where the system diverges.
-    pub fn run(&self, system: System<'_>, drive: &Drive, draws: RecordNoise) -> Option<WorldRun> {
-        match self {
-            Self::Equations(twin) => equations::run(twin, system, drive, draws),
-            Self::BlackBox(twin) => black_box::run(twin, system, drive, draws),
-        }
+/// Makes a record of a twin's world; `None` where the system diverges.
+pub(super) fn run(
+    twin: &Twin,
+    system: System<'_>,
+    drive: &Drive,
+    draws: RecordNoise,
+) -> Option<WorldRun> {
+    match equations(twin) {
+        Some(equations) => equations::run(equations, system, drive, draws),
+        None => black_box::run(twin, system, drive, draws),
     }
 }

@@ -176,9 +176,6 @@ pub fn next_input(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     ))
 }
 
-/// Height of a panel.
-const HEIGHT: f64 = 130.0;
-
 /// Missing functions with ± one standard error, beside the twin alone and on top of the accepted effects; `None` where none was fitted.
 pub fn functions(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let units = Units::of(study);
@@ -213,7 +210,7 @@ fn panel(units: &Units, function: &MissingFunction) -> (String, Vec<Panel>) {
         Line::new(&label, style, points()),
     ];
     let panel = Panel::new(&units.place(&function.place), lines)
-        .height(HEIGHT)
+        .height(130.0)
         .area(Area {
             label: "± 1 standard error".into(),
             points: band,

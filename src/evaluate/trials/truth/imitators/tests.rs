@@ -43,10 +43,11 @@ fn right(id: &str, place: DeparturePlace, sign: f64) -> Vec<String> {
     let plan = RecordPlan::levels(0.3, 200, 1.0, 3.0, 10);
     let study = Study::new("vessel", Vessel, plan).unwrap();
     let listed = Listed::all(&study, &TwinPlaces::new(study.twin()));
-    let variant = *Variant::of(id).last().unwrap();
+    let law = ListedLaw::named(id).unwrap();
+    let variant = *Variant::of(law).last().unwrap();
     let variant = Variant { sign, ..variant };
     experiment(&study, &[0.7], |experiment| {
-        let draft = Draft::variant(id, place, None, variant).unwrap();
+        let draft = Draft::listed(law, place, None, variant);
         let sized = experiment.sized(&draft, 40.0).unwrap().unwrap();
         let all = Imitators::of(experiment, &sized, None, &listed).unwrap();
         let rival = rival(std::slice::from_ref(&all)).unwrap();

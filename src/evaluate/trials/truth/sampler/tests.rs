@@ -248,7 +248,7 @@ fn black_boxes_have_departures_of_signals_and_parameters() {
     let study = Study::new("boxed", Boxed, plan);
     let study = study.unwrap();
     let sampler = sampler(&study);
-    assert!(sampler.is_silent && sampler.world.is_black_box());
+    assert!(sampler.is_silent && equations(sampler.study.twin()).is_none());
     for kind in [Kind::None, Kind::Listed, Kind::Random] {
         let drawn = sampler.draw(0, kind, Extra::default(), Noise::new(2, "box", 0));
         let truth = drawn.unwrap().truth;
