@@ -278,14 +278,14 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 153, items.collect()),
         Ratchet::new("error types", 13, errors),
-        Ratchet::new("lines of code", 49_490, lines),
-        Ratchet::new("files", 450, files.collect()),
+        Ratchet::new("lines of code", 48_950, lines),
+        Ratchet::new("files", 426, files.collect()),
         Ratchet::new("hidden items", 3, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 424, constants(sources)),
+        Ratchet::new("named numeric constants", 409, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
-            7,
+            6,
             wide_functions(sources, 6),
         ),
         Ratchet::new(
@@ -293,7 +293,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
             2,
             long_functions(sources, 100),
         ),
-        Ratchet::new("further types of one name", 44, repeated_types(sources)),
+        Ratchet::new("further types of one name", 32, repeated_types(sources)),
         Ratchet::new(
             "library messages with words of the command line",
             1,

@@ -59,8 +59,8 @@ impl MeanRuns {
         if !plan.scenario.is_point() || runs.is_empty() {
             return Ok(None);
         }
-        let mut truth = Sum::default();
-        let mut answers: Vec<Sum> = ScoredMethod::all().iter().map(|_| Sum::default()).collect();
+        let mut truth = None;
+        let mut answers: Vec<Sum> = vec![None; ScoredMethod::all().len()];
         let mut times = Vec::new();
         for run in runs {
             let one = AnswerRuns::of(study, plan, run)?;
@@ -68,39 +68,36 @@ impl MeanRuns {
                 let drive = one.record.drive();
                 times = (0..drive.samples()).map(|k| drive.time(k)).collect();
             }
-            truth.add(one.truth);
+            add(&mut truth, one.truth);
             for (sum, (_, signal)) in answers.iter_mut().zip(one.answers) {
-                sum.add(signal);
+                add(sum, signal);
             }
         }
         Ok(Some(Self {
             times,
-            truth: truth.mean(),
+            truth: mean(truth),
             answers: (ScoredMethod::all().into_iter())
-                .zip(answers.into_iter().map(Sum::mean))
+                .zip(answers.into_iter().map(mean))
                 .collect(),
             runs: runs.len(),
         }))
     }
 }
 
-/// A mean in the making.
-#[derive(Default)]
-struct Sum(Option<(Signal, f64)>);
+/// Sum and number of signals so far.
+type Sum = Option<(Signal, f64)>;
 
-impl Sum {
-    fn add(&mut self, signal: Option<Signal>) {
-        match (&mut self.0, signal) {
-            (_, None) => {}
-            (None, Some(signal)) => self.0 = Some((signal, 1.0)),
-            (Some((sum, count)), Some(signal)) => {
-                *sum += &signal;
-                *count += 1.0;
-            }
+fn add(sum: &mut Sum, signal: Option<Signal>) {
+    match (sum, signal) {
+        (_, None) => {}
+        (sum @ None, Some(signal)) => *sum = Some((signal, 1.0)),
+        (Some((sum, count)), Some(signal)) => {
+            *sum += &signal;
+            *count += 1.0;
         }
     }
+}
 
-    fn mean(self) -> Option<Signal> {
-        self.0.map(|(sum, count)| sum / count)
-    }
+fn mean(sum: Sum) -> Option<Signal> {
+    sum.map(|(sum, count)| sum / count)
 }

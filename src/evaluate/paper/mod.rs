@@ -10,6 +10,7 @@
 //! # Ok::<(), truetwin::study::StudyError>(())
 //! ```
 
+mod benchmark;
 mod free_runs;
 mod monte_carlo;
 mod presets;
@@ -17,12 +18,11 @@ mod run;
 mod scenario;
 mod score;
 
+pub(crate) use benchmark::{Benchmark, ScoredMethod};
+use benchmark::{Invariant, Published, Symmetry, TestPoint};
 pub(crate) use free_runs::{AnswerRuns, MeanRuns};
 pub(crate) use monte_carlo::{MonteCarlo, Origin};
 pub use presets::{reference_projects, reference_studies};
 pub(crate) use run::BenchmarkRun;
-pub(crate) use run::ScoredMethod;
-pub(crate) use scenario::{Benchmark, Scenario};
-use scenario::{Published, TestPoint};
+pub(crate) use scenario::Scenario;
 pub(crate) use score::{Coverage, MethodScore, PointScore, Scores, score};
-use score::{Invariant, Symmetry};

@@ -1,13 +1,12 @@
 //! Sources of true parameters and inputs of simulated records.
 
-use super::{Invariant, ScoredMethod, Symmetry};
+use super::Benchmark;
 use crate::evaluate::EvaluateError;
 use crate::fit::least_squares::{Bounds, space_filling};
 use crate::record::{Drive, Record, RecordError, Signal};
 use crate::study::{DriveSource, RecordPlan, Study};
 use crate::twin::{Interval, Noise, Parameter, ParameterSpace};
 use nalgebra::DVector;
-use serde::Serialize;
 
 /// Source of true parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,36 +47,6 @@ impl Scenario {
     pub fn is_point(self) -> bool {
         matches!(self, Self::First | Self::Second)
     }
-}
-
-/// Published knowledge about a twin: test points, quantities that a record determines, figures.
-#[derive(Debug, Clone, Default)]
-pub struct Benchmark {
-    /// Parameters of the test points; empty where there are none.
-    pub points: &'static [TestPoint],
-    /// The first input of every record, as levels; empty for the study's own random inputs.
-    pub levels: &'static [f64],
-    /// Samples that a level is held.
-    pub hold: usize,
-    /// Functions of θ that a record determines.
-    pub invariants: &'static [Invariant],
-    /// Change of θ that a record hardly shows.
-    pub symmetry: Option<Symmetry>,
-    /// Published figures, of [`Scenario::First`].
-    pub published: &'static [(ScoredMethod, Published)],
-}
-
-/// A parameter and its values at OOD 1 and OOD 2.
-pub type TestPoint = (&'static str, [f64; 2]);
-
-/// A published figure.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Published {
-    /// Mean squared error.
-    pub mse: f64,
-    /// Milliseconds a record, on the authors' machine.
-    #[serde(rename = "ms")]
-    pub milliseconds: f64,
 }
 
 /// A simulated record and what it came from.

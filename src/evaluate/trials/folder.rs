@@ -8,6 +8,7 @@ use crate::storage::untrusted::check_file;
 use crate::storage::work::{Manifest, WorkFolder};
 use crate::storage::{NewFolder, StorageError};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::io;
 use std::path::Path;
 
@@ -111,34 +112,40 @@ impl Folder {
     /// Opens the keys of so many trials, if they are still those that were sealed.
     pub fn keys(&self, trials: usize) -> Result<Vec<Truth>, EvaluateError> {
         let text = self.work.read(KEYS)?;
-        let damaged = |reason| self.damaged(KEYS, reason);
         if sha256(text.as_bytes()) != self.seal {
-            return Err(damaged("its SHA-256 is not that of seal.txt".into()));
+            return Err(self.damaged(KEYS, "its SHA-256 is not that of seal.txt"));
         }
-        let keys: Vec<Truth> =
-            serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
-        if !keys.iter().map(|key| key.trial).eq(0..trials) {
-            return Err(damaged("trials are missing".into()));
-        }
-        Ok(keys)
+        self.list(KEYS, &text, |keys: &Vec<Truth>| {
+            keys.iter().map(|key| key.trial).eq(0..trials)
+        })
     }
 
     /// The effects that the libraries of so many trials do without.
     pub fn left_out(&self, trials: usize) -> Result<Vec<Vec<String>>, EvaluateError> {
         let text = self.work.read(LEFT_OUT)?;
-        let damaged = |reason| self.damaged(LEFT_OUT, reason);
-        let left_out: Vec<Vec<String>> =
-            serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
-        if left_out.len() != trials {
-            return Err(damaged("trials are missing".into()));
-        }
-        Ok(left_out)
+        self.list(LEFT_OUT, &text, |all: &Vec<Vec<String>>| {
+            all.len() == trials
+        })
     }
 
-    fn damaged(&self, file: &str, reason: String) -> EvaluateError {
+    fn list<T: DeserializeOwned>(
+        &self,
+        file: &str,
+        text: &str,
+        is_whole: impl Fn(&T) -> bool,
+    ) -> Result<T, EvaluateError> {
+        let list =
+            serde_json::from_str(text).map_err(|error| self.damaged(file, &error.to_string()))?;
+        match is_whole(&list) {
+            true => Ok(list),
+            false => Err(self.damaged(file, "trials are missing")),
+        }
+    }
+
+    fn damaged(&self, file: &str, reason: &str) -> EvaluateError {
         EvaluateError::Damaged {
             path: self.work.file(file),
-            reason,
+            reason: reason.to_owned(),
             remedy: "remove the folder and start again",
         }
     }

@@ -56,14 +56,6 @@ pub(super) struct Match {
     pub unexplained: f64,
 }
 
-impl Match {
-    /// Nothing in common.
-    pub const NONE: Self = Self {
-        multiple: 0.0,
-        unexplained: 1.0,
-    };
-}
-
 /// Filter at the truth of one record without departures.
 pub(super) struct Information {
     problem: Problem,
@@ -214,14 +206,15 @@ impl Information {
     pub fn matched(&self, change: &InnovationChange, by: &InnovationChange) -> Match {
         let own = |a: &InnovationChange| self.product(&a.0[0], &a.0[1]).max(0.0);
         let (a, b) = (own(change), own(by));
-        if a == 0.0 || b == 0.0 {
-            return Match::NONE;
-        }
         let both =
             0.5 * (self.product(&change.0[0], &by.0[1]) + self.product(&change.0[1], &by.0[0]));
+        let (multiple, unexplained) = match a == 0.0 || b == 0.0 {
+            true => (0.0, 1.0),
+            false => (both / b, (1.0 - both * both / (a * b)).max(0.0)),
+        };
         Match {
-            multiple: both / b,
-            unexplained: (1.0 - both * both / (a * b)).max(0.0),
+            multiple,
+            unexplained,
         }
     }
 

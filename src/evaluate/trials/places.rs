@@ -95,16 +95,13 @@ impl TwinPlaces {
 }
 
 /// States and sensors that something enters.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Entries(Vec<DeparturePlace>);
+type Entries = Vec<DeparturePlace>;
 
-impl Entries {
-    /// The state or sensor, where it is the only one.
-    fn only(&self) -> Option<DeparturePlace> {
-        match self.0[..] {
-            [place] => Some(place),
-            _ => None,
-        }
+/// The state or sensor, where it is the only one.
+fn only(entries: &Entries) -> Option<DeparturePlace> {
+    match entries[..] {
+        [place] => Some(place),
+        _ => None,
     }
 }
 
@@ -175,12 +172,10 @@ impl Structure {
                     |(own, there): &(Vec<f64>, Vec<f64>)| own[*k].to_bits() != there[*k].to_bits();
                 pairs.iter().any(differs)
             };
-            Entries(
-                (0..states + outputs)
-                    .filter(is_changed)
-                    .map(place)
-                    .collect(),
-            )
+            (0..states + outputs)
+                .filter(is_changed)
+                .map(place)
+                .collect::<Entries>()
         };
         let steps: Vec<f64> = (outline.parameters.iter())
             .map(|p| TRIAL.structure_step * p.prior.width())
@@ -194,7 +189,7 @@ impl Structure {
         let is_state = |place: &DeparturePlace| matches!(place, DeparturePlace::State(_));
         let gains = (steps.iter().zip(&parameters).enumerate())
             .map(|(p, (step, entries))| {
-                if entries.0.is_empty() || !entries.0.iter().all(is_state) {
+                if entries.is_empty() || !entries.iter().all(is_state) {
                     return None;
                 }
                 let gain = gain(&values, scene, &moments, (p, *step))?;
@@ -213,13 +208,13 @@ impl Structure {
         match place {
             DeparturePlace::Parameter(p) => {
                 let gain = self.gains.get(p).copied().flatten();
-                let only = self.parameters.get(p).and_then(Entries::only);
+                let only = self.parameters.get(p).and_then(only);
                 only.into_iter()
                     .chain(gain.map(DeparturePlace::Actuator))
                     .collect()
             }
             DeparturePlace::Actuator(j) => {
-                let only = self.inputs.get(j).and_then(Entries::only);
+                let only = self.inputs.get(j).and_then(only);
                 let gains = (self.gains.iter().enumerate())
                     .filter(|(_, gain)| **gain == Some(j))
                     .map(|(p, _)| DeparturePlace::Parameter(p));

@@ -12,6 +12,7 @@ mod limits;
 mod next;
 mod pictures;
 mod place;
+mod share;
 mod statement;
 #[cfg(test)]
 mod tests;

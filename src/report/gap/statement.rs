@@ -1,6 +1,6 @@
 //! The answer in words: headline, what follows from it, what to do next. All of it follows from verdict, decision and probabilities.
 
-use super::extent::share_with_interval;
+use super::share::share_with_interval;
 use super::words::{MOST_NAMES, effect, effects, few, joined};
 use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, Verdict};
 use crate::report::NEXT_INPUT;

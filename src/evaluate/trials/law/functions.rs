@@ -33,34 +33,30 @@ impl Tree {
     pub fn draw(arguments: usize, kinked: bool, source: &mut Source) -> Self {
         let mut root = Self::grown(0, source);
         for argument in 1..arguments {
-            let (own, other) = (Box::new(root), Box::new(Self::grown(argument, source)));
+            let other = Self::grown(argument, source);
             root = match source.happens(0.6) {
-                true => Self::Product(own, other),
-                false => Self::Sum(own, other),
+                true => Self::Product(Box::new(root), Box::new(other)),
+                false => Self::sum(root, other),
             };
         }
         if !kinked {
             return root;
         }
-        let shift = Self::Number(uniform(source, -0.7, 0.7));
-        let shifted = Box::new(Self::Sum(Box::new(root), Box::new(shift)));
+        let shifted = Self::sum(root, Self::Number(uniform(source, -0.7, 0.7)));
         match source.happens(0.5) {
-            true => Self::Size(shifted),
-            false => Self::Part(shifted),
+            true => Self::Size(Box::new(shifted)),
+            false => Self::Part(Box::new(shifted)),
         }
     }
 
     /// A smooth function of one argument.
     fn grown(argument: usize, source: &mut Source) -> Self {
-        let slope = Self::Number(uniform(source, 0.8, 3.0));
-        let shift = Self::Number(uniform(source, -1.0, 1.0));
-        let line = Self::Sum(
-            Box::new(Self::Product(
-                Box::new(slope),
-                Box::new(Self::Argument(argument)),
-            )),
-            Box::new(shift),
-        );
+        let times = |factor: f64| {
+            let argument = Box::new(Self::Argument(argument));
+            Self::Product(Box::new(Self::Number(factor)), argument)
+        };
+        let slope = times(uniform(source, 0.8, 3.0));
+        let line = Self::sum(slope, Self::Number(uniform(source, -1.0, 1.0)));
         let line = Box::new(line);
         let inner = match (4.0 * source.uniform()) as usize {
             0 => Self::Sine(line),
@@ -71,9 +67,12 @@ impl Tree {
         if source.happens(0.5) {
             return inner;
         }
-        let weight = Self::Number(uniform(source, -1.5, 1.5));
-        let again = Self::Product(Box::new(weight), Box::new(Self::Argument(argument)));
-        Self::Sum(Box::new(inner), Box::new(Self::Sine(Box::new(again))))
+        let again = times(uniform(source, -1.5, 1.5));
+        Self::sum(inner, Self::Sine(Box::new(again)))
+    }
+
+    fn sum(a: Self, b: Self) -> Self {
+        Self::Sum(Box::new(a), Box::new(b))
     }
 
     /// The value at these arguments.

@@ -4,7 +4,7 @@ use crate::diagnose::{Decision, Diagnosis, EffectFit, Horizon, Shrinkage};
 use crate::math::median;
 use crate::report::chart::{Bar, BarGroup, Line, Panel, Style, TimeMark, bar_chart, chart};
 use crate::report::digits::{chance, in_unit, percent, short};
-use crate::report::gap::extent::{measure, share_with_interval};
+use crate::report::gap::share::{measure, share_with_interval};
 use crate::report::units::Units;
 use crate::study::Study;
 
