@@ -104,9 +104,7 @@ impl Verb for Withheld {
 /// Parses a number of trials. A number that is too large is refused with the limit, however it is written.
 fn number_of_trials(text: &str) -> Result<usize, String> {
     match text.parse::<f64>() {
-        Ok(number) if number > MOST_RECORDS as f64 => {
-            Err(format!("choose at most {MOST_RECORDS}"))
-        }
+        Ok(number) if number > MOST_RECORDS as f64 => Err(format!("choose at most {MOST_RECORDS}")),
         _ => at_least_one(text),
     }
 }
