@@ -1,6 +1,7 @@
 //! Effects that a study lets a diagnosis name.
 
-use crate::effect::{Effect, EffectKey, EffectPattern, Law};
+use crate::effect::{Effect, EffectKey, EffectPattern};
+use crate::twin::Law;
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::merged;
 use crate::hypothesis::term::Term;

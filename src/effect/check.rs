@@ -1,9 +1,9 @@
 //! Effects against the twin that they are added to.
 
-use super::law::{Law, NOISE_ENTERS, TargetKind};
+use super::law::{NOISE_ENTERS, TargetKind};
 use super::placed::Effect;
 use crate::record::Signals;
-use crate::twin::{Outline, TwinError, is_memory};
+use crate::twin::{Law, Outline, TwinError, is_memory};
 
 /// Returns the names of all targets of a kind, in a twin with these equations (none: a black box) and signals.
 pub(crate) fn targets(

@@ -1,9 +1,9 @@
 //! One row of the library: id, law, magnitudes.
 
-use super::law::{ForcePoint, Instant, Law};
+use super::law::{ForcePoint, NOISE_ENTERS};
 use super::magnitude::Magnitude;
 use super::marks::Mark;
-use crate::twin::Outliers;
+use crate::twin::{Law, Now, Outliers};
 use std::fmt;
 use std::sync::Arc;
 
@@ -63,20 +63,21 @@ pub struct EffectKind {
 }
 
 impl EffectKind {
-    /// Creates an effect that changes an output: `law(m, now, memory, s)` returns the signal that the sensor shows.
+    /// Creates an effect that changes an output: `law(m, now, memory, s)` returns the signal that the sensor shows; `now` has time, step
+    /// and inputs.
     pub fn sensor(
         id: &str,
         formula: &str,
-        law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
+        law: impl Fn(&[f64], &Now<'_>, &mut [f64], f64) -> f64 + Send + Sync + 'static,
     ) -> Self {
         Self::new(id, formula, Law::Sensor(Arc::new(law)))
     }
 
-    /// Creates an effect that changes an input: `law(m, now, memory, u)` returns the signal that acts.
+    /// Creates an effect that changes an input: `law(m, now, memory, u)` returns the signal that acts; `now` has time, step and inputs.
     pub fn actuator(
         id: &str,
         formula: &str,
-        law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
+        law: impl Fn(&[f64], &Now<'_>, &mut [f64], f64) -> f64 + Send + Sync + 'static,
     ) -> Self {
         Self::new(id, formula, Law::Actuator(Arc::new(law)))
     }
@@ -114,7 +115,7 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64]) -> f64 + Send + Sync + 'static,
     ) -> Self {
-        Self::new(id, formula, Law::MeasurementNoise(Arc::new(law))).order(super::law::NOISE_ENTERS)
+        Self::new(id, formula, Law::MeasurementNoise(Arc::new(law))).order(NOISE_ENTERS)
     }
 
     /// Creates noise of a state: `law(m)` is the standard deviation of its increment a step.
@@ -294,7 +295,6 @@ impl fmt::Debug for EffectKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("EffectKind")
             .field("id", &self.id)
-            .field("law", &self.law)
             .field("magnitudes", &self.magnitudes)
             .finish_non_exhaustive()
     }

@@ -1,20 +1,17 @@
 //! The law of an effect: a function of the twin's signals, states, parameters or noise.
+//!
+//! A user's law is one of a single point. The twin calls it for several points at once, so that the loop over them is compiled with the
+//! law inline.
 
-use crate::twin::{NoiseLaw, OutlierLaw, ParameterChange, RateChange, SignalChange, StateLimit};
-use std::fmt;
-use std::sync::Arc;
+use crate::twin::{
+    Law, LawPlace, Layout, Now, ParameterChange, RateChange, SignalChange, StateLimit,
+};
 
 /// Position along a sensor's signal at which the measurement noise enters.
 pub(crate) const NOISE_ENTERS: u32 = 70;
 
-/// Time of a sample, and the step, in seconds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Instant {
-    /// Seconds from the first sample.
-    pub t: f64,
-    /// Step Δt.
-    pub dt: f64,
-}
+/// Memories that a look at a signal copies without the heap.
+const SHORT: usize = 8;
 
 /// Everything that a force may depend on.
 #[derive(Debug, Clone, Copy)]
@@ -33,37 +30,15 @@ pub struct ForcePoint<'a> {
     pub theta: &'a [f64],
 }
 
-/// The law of an effect: a function of its magnitudes and of what it bends, over several points at once.
-#[derive(Clone)]
-#[non_exhaustive]
-pub(crate) enum Law {
-    /// An output signal.
-    Sensor(Arc<dyn SignalChange>),
-    /// An input signal.
-    Actuator(Arc<dyn SignalChange>),
-    /// The rate of a state.
-    Force(Arc<dyn RateChange>),
-    /// A limit on a state, after each step.
-    Limit(Arc<dyn StateLimit>),
-    /// A parameter over time.
-    Parameter(Arc<dyn ParameterChange>),
-    /// The noise of an output: a standard deviation that joins the twin's own in quadrature.
-    MeasurementNoise(Arc<NoiseLaw>),
-    /// The noise of a state.
-    ProcessNoise(Arc<NoiseLaw>),
-    /// Rounding of an output, after its noise: the law is the step.
-    Rounding(Arc<NoiseLaw>),
-    /// Rare large errors of an output, after everything else.
-    Outliers(Arc<OutlierLaw>),
-}
-
 impl Law {
     /// Returns the kind of target.
     pub fn target(&self) -> TargetKind {
         match self {
-            Self::Sensor(_) | Self::MeasurementNoise(_) | Self::Rounding(_) | Self::Outliers(_) => {
-                TargetKind::Sensor
-            }
+            Self::Sensor(_)
+            | Self::Reading(_)
+            | Self::MeasurementNoise(_)
+            | Self::Rounding(_)
+            | Self::Outliers(_) => TargetKind::Sensor,
             Self::Actuator(_) => TargetKind::Actuator,
             Self::Force(_) | Self::Limit(_) | Self::ProcessNoise(_) => TargetKind::State,
             Self::Parameter(_) => TargetKind::Parameter,
@@ -76,22 +51,6 @@ impl Law {
             self,
             Self::MeasurementNoise(_) | Self::ProcessNoise(_) | Self::Outliers(_)
         )
-    }
-}
-
-impl fmt::Debug for Law {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Sensor(_) => "Sensor",
-            Self::Actuator(_) => "Actuator",
-            Self::Force(_) => "Force",
-            Self::Limit(_) => "Limit",
-            Self::Parameter(_) => "Parameter",
-            Self::MeasurementNoise(_) => "MeasurementNoise",
-            Self::ProcessNoise(_) => "ProcessNoise",
-            Self::Rounding(_) => "Rounding",
-            Self::Outliers(_) => "Outliers",
-        })
     }
 }
 
@@ -123,5 +82,111 @@ impl TargetKind {
     /// Returns whether it is a signal, which black boxes have, too.
     pub fn is_signal(self) -> bool {
         matches!(self, Self::Sensor | Self::Actuator)
+    }
+}
+
+impl<F> SignalChange for F
+where
+    F: Fn(&[f64], &Now<'_>, &mut [f64], f64) -> f64 + Send + Sync,
+{
+    fn pass(
+        &self,
+        m: &[f64],
+        now: &Now<'_>,
+        on: &LawPlace,
+        (at, x): (Layout, &mut [f64]),
+        (p, y): (usize, &mut [f64]),
+    ) {
+        let (memory, target) = (on.memory.clone(), on.target);
+        for (x, y) in at.each_mut(x).zip(y.chunks_exact_mut(p)) {
+            y[target] = self(m, now, &mut x[memory.clone()], y[target]);
+        }
+    }
+
+    fn peek(
+        &self,
+        m: &[f64],
+        now: &Now<'_>,
+        on: &LawPlace,
+        (at, x): (Layout, &[f64]),
+        (p, y): (usize, &mut [f64]),
+    ) {
+        let (memory, target) = (on.memory.clone(), on.target);
+        let outputs = y.chunks_exact_mut(p);
+        match memory.len() {
+            0 => {
+                for y in outputs {
+                    y[target] = self(m, now, &mut [], y[target]);
+                }
+            }
+            1 => {
+                for (x, y) in at.each(x).zip(outputs) {
+                    y[target] = self(m, now, &mut [x[memory.start]], y[target]);
+                }
+            }
+            length => {
+                let (mut few, mut many) = ([0.0; SHORT], vec![]);
+                let copy = match few.get_mut(..length) {
+                    Some(copy) => copy,
+                    None => {
+                        many.resize(length, 0.0);
+                        &mut many[..]
+                    }
+                };
+                for (x, y) in at.each(x).zip(outputs) {
+                    copy.copy_from_slice(&x[memory.clone()]);
+                    y[target] = self(m, now, copy, y[target]);
+                }
+            }
+        }
+    }
+}
+
+impl<F> RateChange for F
+where
+    F: Fn(&[f64], &ForcePoint<'_>) -> f64 + Send + Sync,
+{
+    fn push(
+        &self,
+        m: &[f64],
+        now: &Now<'_>,
+        on: &LawPlace,
+        (at, x): (Layout, &[f64]),
+        dx: &mut [f64],
+    ) {
+        for (states, rates) in at.each(x).zip(at.each_mut(dx)) {
+            let point = ForcePoint {
+                x: states[on.target],
+                other: on.other.map_or(0.0, |j| states[j]),
+                t: now.t,
+                states,
+                u: now.u,
+                theta: now.theta,
+            };
+            rates[on.target] += self(m, &point);
+        }
+    }
+}
+
+impl<F> StateLimit for F
+where
+    F: Fn(&[f64], &mut f64, Option<&mut f64>) + Send + Sync,
+{
+    fn hold(&self, m: &[f64], on: &LawPlace, at: Layout, x: &mut [f64]) {
+        let other = on.other.filter(|j| *j != on.target);
+        for x in at.each_mut(x) {
+            let mut value = x[on.target];
+            self(m, &mut value, other.map(|j| &mut x[j]));
+            x[on.target] = value;
+        }
+    }
+}
+
+impl<F> ParameterChange for F
+where
+    F: Fn(&[f64], f64, f64) -> f64 + Send + Sync,
+{
+    fn value(&self, m: &[f64], now: &Now<'_>, _: &[f64], value: f64) -> f64 {
+        self(m, now.t, value)
     }
 }

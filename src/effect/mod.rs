@@ -14,7 +14,6 @@
 //! | a twin with effects | [`augment`] |
 
 mod augment;
-mod batch;
 mod catalogue;
 mod check;
 mod file;
@@ -33,8 +32,8 @@ pub use catalogue::Catalogue;
 pub(crate) use check::targets;
 pub use key::{EffectKey, EffectPattern};
 pub use kind::{EffectKind, OtherState};
-pub use law::{ForcePoint, Instant};
-pub(crate) use law::{Law, TargetKind};
+pub use law::ForcePoint;
+pub(crate) use law::TargetKind;
 pub(crate) use library::{clamp, lag};
 pub use magnitude::{Magnitude, Shape};
 pub(crate) use marks::{Mark, clipped, on_levels, rounded, stops};

@@ -2,9 +2,8 @@
 
 use super::key::EffectKey;
 use super::kind::EffectKind;
-use super::law::Law;
 use super::magnitude::Magnitude;
-use crate::twin::TwinError;
+use crate::twin::{Law, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;

@@ -3,8 +3,8 @@
 use super::basis::{Of, TERMS, sum_of_one};
 pub(crate) use crate::twin::Entry;
 use crate::twin::{
-    Disturbance, LARGEST, Layout, Now, OutputChannel, Parameter, ParameterChange, Placed, Role,
-    SignalChange, SignalPart, Twin, TwinPart,
+    Disturbance, LARGEST, Law, LawPart, LawPlace, Layout, Now, Parameter, ParameterChange, Role,
+    SignalChange, Twin, TwinPart,
 };
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ impl SignalChange for Entered {
         &self,
         m: &[f64],
         now: &Now<'_>,
-        on: &OutputChannel,
+        on: &LawPlace,
         (at, x): (Layout, &[f64]),
         (p, y): (usize, &mut [f64]),
     ) {
@@ -59,23 +59,14 @@ pub(crate) fn with_function(twin: &Twin, function: Entered) -> Twin {
         Parameter::new(&format!("function/{k}"), "", -1.0, 1.0).with_role(Role::Magnitude)
     });
     let (law, magnitudes) = (Arc::new(function), twin.entries()..twin.entries() + TERMS);
-    let part = match function.entry {
-        Entry::Sensor(target) => TwinPart::Sensor(SignalPart {
-            name: "function".into(),
-            target,
-            memory: 0,
-            is_of_readings: false,
-            is_dead_time: false,
-            change: Placed { law, magnitudes },
-        }),
-        Entry::Parameter(i) => TwinPart::Parameter {
-            entry: twin.entry(i),
-            change: Placed { law, magnitudes },
-        },
+    let (law, target) = match function.entry {
+        Entry::Sensor(target) => (Law::Sensor(law), target),
+        Entry::Parameter(i) => (Law::Parameter(law), twin.entry(i)),
         // Rates and inputs have functions that are effects.
         Entry::State(_) | Entry::Actuator(_) => return twin.clone(),
     };
-    twin.with(coefficients, vec![part])
+    let part = LawPart::new(law, "function".into(), target, magnitudes);
+    twin.with(coefficients, vec![TwinPart::Law(part)])
 }
 
 /// Returns the twin with an Ornstein–Uhlenbeck disturbance, θ longer by its strength σ > 0: what an effect that nobody listed would look

@@ -12,9 +12,9 @@
 use super::basis::{Of, TERMS, pairs, sum_of_one, sum_of_two};
 use super::entry::{Entered, Entry};
 use super::term::{Nature, Part, Start, Term};
-use crate::effect::{Effect, EffectKind, Instant, Magnitude, Shape, clamp, lag};
+use crate::effect::{Effect, EffectKind, Magnitude, Shape, clamp, lag};
 use crate::fit::axis::{Axis, EvidencePrior};
-use crate::twin::{Interval, Parameter};
+use crate::twin::{Interval, Now, Parameter};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -184,7 +184,7 @@ fn passing(
     is_sensor: bool,
     [sensor, actuator]: [&'static str; 2],
     count: usize,
-    law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
+    law: impl Fn(&[f64], &Now<'_>, &mut [f64], f64) -> f64 + Send + Sync + 'static,
 ) -> EffectKind {
     let kind = match is_sensor {
         true => EffectKind::sensor(id, sensor, law),
@@ -198,7 +198,7 @@ pub(super) fn of_signal(target: &str, is_sensor: bool, variable: &Variable, larg
     let id = format!("f({})", variable.name);
     let ends = variable.ends();
     let of = variable.of;
-    let law = move |m: &[f64], now: Instant, _: &mut [f64], s: f64| {
+    let law = move |m: &[f64], now: &Now<'_>, _: &mut [f64], s: f64| {
         s + sum_of_one(m, of.value(now.t, &[], &[], s), ends)
     };
     let seen = vec![(variable.name.clone(), ends.0, ends.1)];
@@ -243,7 +243,7 @@ pub(super) fn entered(target: &str, entry: Entry, variable: &Variable, largest: 
 /// An unknown answer of a signal to its past: s + Σ β_k·(s seen through a first-order lag of τ_k − s).
 pub(super) fn of_past(target: &str, is_sensor: bool, name: &str, times: [f64; PASTS]) -> Term {
     let id = format!("past({name})");
-    let law = move |m: &[f64], now: Instant, memory: &mut [f64], s: f64| {
+    let law = move |m: &[f64], now: &Now<'_>, memory: &mut [f64], s: f64| {
         let mut sum = s;
         for ((m, z), tau) in m.iter().zip(memory).zip(times) {
             sum += m * (lag(tau, now.dt, z, s) - s);
@@ -300,7 +300,7 @@ pub(super) fn of_trace(
 ) -> Term {
     let id = format!("f({})", variable.name);
     let ends = variable.ends();
-    let law = move |m: &[f64], now: Instant, memory: &mut [f64], s: f64| {
+    let law = move |m: &[f64], now: &Now<'_>, memory: &mut [f64], s: f64| {
         memory[0] = trace.next(memory[0], s, now.dt);
         s + sum_of_one(m, memory[0], ends)
     };

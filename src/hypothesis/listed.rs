@@ -3,11 +3,11 @@
 use super::magnitude::{Ranges, frequency};
 use super::scales::{Scales, largest};
 use super::term::{Nature, Part, Start, Term, with_terms};
-use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
+use crate::effect::{Effect, Magnitude, Mark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::likelihood::kalman::FilterError;
 use crate::record::Signal;
-use crate::twin::{Parameter, Twin};
+use crate::twin::{Law, Parameter, Twin};
 use std::collections::BTreeMap;
 
 /// Shares of its range at which a size with two ends is tried, besides next to nothing. A part of a signal that is rectified, the only such

@@ -1,9 +1,9 @@
 //! Ranges of magnitudes on a record: the prior of each shape, and the values at which a search looks.
 
-use crate::effect::{Effect, Law, Magnitude, Shape, TargetKind};
+use crate::effect::{Effect, Magnitude, Shape, TargetKind};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::math::{deviation, ends, quantile};
-use crate::twin::{Interval, Parameter};
+use crate::twin::{Interval, Law, Parameter};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Longest lag or delay, as a share of the record: a longer one shows fewer than four times, and passes for the twin's own motion. At half

@@ -30,9 +30,9 @@ mod state_space;
 
 pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt, begun};
 pub(crate) use composed::{
-    Acting, DeadTime, Disturbance, Entry, FittedLevels, KnownNoise, LARGEST, LevelSource, NoiseLaw,
-    NoisePart, OutlierLaw, OutputChannel, ParameterChange, Placed, RateChange, SensorNoise,
-    SignalChange, SignalPart, StateLimit, StatePair, TwinPart, WhiteLevel,
+    Acting, DeadTime, Disturbance, Entry, FittedLevels, KnownNoise, LARGEST, Law, LawPart,
+    LawPlace, LevelSource, NoiseLaw, NoisePart, OutlierLaw, ParameterChange, RateChange,
+    SensorNoise, SignalChange, StateLimit, TwinPart, WhiteLevel,
 };
 pub use composed::{Composed, ComposedBlackBox, DigitalTwin};
 pub(crate) use definitions::rates;

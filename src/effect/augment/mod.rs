@@ -1,13 +1,12 @@
 //! Twins with effects: each effect is a part of the twin.
 
 use super::check::{check_effects, targets};
-use super::law::{Law, NOISE_ENTERS};
+use super::law::NOISE_ENTERS;
 use super::placed::Effect;
 use super::unit::magnitude_unit;
 use crate::record::{Quantity, Signals};
 use crate::twin::{
-    Interval, Parameter, Placed, Role, SignalChange, SignalPart, SimulationError, StatePair, Twin,
-    TwinError, TwinPart,
+    Interval, Law, LawPart, Parameter, Role, SimulationError, Twin, TwinError, TwinPart,
 };
 use std::ops::Range;
 use std::sync::Arc;
@@ -80,7 +79,7 @@ fn augmented(base: Twin, effects: Vec<Effect>, may_be_late: bool) -> Result<Twin
         .collect();
     for (effect, magnitudes) in placed.into_iter().filter(|(effect, _)| !is_late(effect)) {
         let known = targets(effect.law().target(), outline.as_ref(), &signals);
-        parts.push(part(&base, &effect, magnitudes, &known));
+        parts.push(TwinPart::Law(part(&base, &effect, magnitudes, &known)));
     }
     if !late.is_empty() {
         parts.push(TwinPart::Late(late));
@@ -98,61 +97,19 @@ fn check_of(effect: Effect, magnitudes: Range<usize>) -> TwinPart {
 }
 
 /// Returns the part that an effect is; `known` are the targets of its kind.
-fn part(base: &Twin, effect: &Effect, magnitudes: Range<usize>, known: &[String]) -> TwinPart {
+fn part(base: &Twin, effect: &Effect, magnitudes: Range<usize>, known: &[String]) -> LawPart {
     let index = |name: &str| known.iter().position(|k| k == name);
-    let target = index(effect.target()).unwrap_or(0);
-    let on = StatePair {
-        target,
+    let (kind, target) = (effect.kind(), index(effect.target()).unwrap_or(0));
+    let (law, target) = match effect.law() {
+        Law::Parameter(_) => (effect.law().clone(), base.entry(target)),
+        Law::Sensor(law) if kind.position() > NOISE_ENTERS => (Law::Reading(law.clone()), target),
+        law => (law.clone(), target),
+    };
+    LawPart {
         other: effect.other().and_then(index),
-    };
-    let kind = effect.kind();
-    let signal = |law: &Arc<dyn SignalChange>| SignalPart {
-        name: effect.key().to_string(),
-        target,
         memory: kind.memory_values(),
-        is_of_readings: kind.position() > NOISE_ENTERS,
         is_dead_time: kind.is_dead_time(),
-        change: placed(law, &magnitudes),
-    };
-    match effect.law() {
-        Law::Sensor(law) => TwinPart::Sensor(signal(law)),
-        Law::Actuator(law) => TwinPart::Actuator(signal(law)),
-        Law::Force(law) => TwinPart::Rate {
-            on,
-            change: placed(law, &magnitudes),
-        },
-        Law::Limit(law) => TwinPart::Limit {
-            on,
-            limit: placed(law, &magnitudes),
-        },
-        Law::Parameter(law) => TwinPart::Parameter {
-            entry: base.entry(target),
-            change: placed(law, &magnitudes),
-        },
-        Law::MeasurementNoise(law) => TwinPart::MeasurementNoise {
-            target,
-            level: placed(law, &magnitudes),
-        },
-        Law::ProcessNoise(law) => TwinPart::ProcessNoise {
-            target,
-            level: placed(law, &magnitudes),
-        },
-        Law::Rounding(law) => TwinPart::Rounding {
-            target,
-            step: placed(law, &magnitudes),
-        },
-        Law::Outliers(law) => TwinPart::Outliers {
-            target,
-            law: placed(law, &magnitudes),
-            source: effect.key().to_string(),
-        },
-    }
-}
-
-fn placed<L: ?Sized>(law: &Arc<L>, magnitudes: &Range<usize>) -> Placed<L> {
-    Placed {
-        law: law.clone(),
-        magnitudes: magnitudes.clone(),
+        ..LawPart::new(law, effect.key().to_string(), target, magnitudes)
     }
 }
 

@@ -9,10 +9,10 @@
 //!
 //! is the likeliest to be a motion. A record of it is one of the twin without the law, whose fit is a start beside the law.
 
-use crate::effect::{Effect, Law, TargetKind, targets};
+use crate::effect::{Effect, TargetKind, targets};
 use crate::hypothesis::term::{Part, Term};
 use crate::record::{Record, Signal};
-use crate::twin::{Now, Twin};
+use crate::twin::{Law, Now, Twin};
 
 /// Points at which a law is looked at, over three times what the record spans on both sides of zero.
 const POINTS: usize = 601;

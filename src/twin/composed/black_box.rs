@@ -1,7 +1,7 @@
 //! Parts of a black box, over whole signals.
 
 use super::digital_twin::mean_run;
-use super::part::{Disturbance, Entry, LARGEST, ParameterChange, Placed, TwinPart};
+use super::part::{Disturbance, Entry, LARGEST, Law, LawPart, ParameterChange, TwinPart};
 use super::parts::{Added, Parts, Theta};
 use super::simulation::check_length;
 use crate::record::{Drive, Signal, Signals};
@@ -102,8 +102,7 @@ impl ComposedBlackBox {
         for added in &self.parts.list {
             match &added.part {
                 TwinPart::White(noise) => is_known = noise.is_silent,
-                TwinPart::Sensor(part) if part.is_of_readings => return Ok(None),
-                TwinPart::Rounding { .. } | TwinPart::Outliers { .. } => return Ok(None),
+                TwinPart::Law(part) if part.is_behind_noise() => return Ok(None),
                 TwinPart::Disturbance(disturbance)
                     if matches!(disturbance.entry, Entry::Actuator(_)) =>
                 {
@@ -138,10 +137,15 @@ impl ComposedBlackBox {
         };
         let inner = |theta: &[f64], drive: &Drive| self.outputs(inside, theta, drive, noise);
         match part {
-            TwinPart::Actuator(part) => return inner(theta, &part.act(theta, drive)?),
-            TwinPart::Parameter { entry, change } => {
-                return self.followed(inside, (theta, *entry), change, (drive, noise));
-            }
+            TwinPart::Law(part) => match &part.law {
+                Law::Actuator(law) => {
+                    return inner(theta, &part.act(law.as_ref(), theta, drive)?);
+                }
+                Law::Parameter(law) => {
+                    return self.followed(inside, (part, law.as_ref()), theta, (drive, noise));
+                }
+                _ => {}
+            },
             TwinPart::Disturbance(part) => {
                 if let Entry::Actuator(input) = part.entry {
                     let mut inputs = drive.inputs().clone();
@@ -166,27 +170,27 @@ impl ComposedBlackBox {
         }
         let mut outputs = inner(theta, drive)?;
         match part {
-            TwinPart::Sensor(part) => {
-                if part.is_of_readings {
+            TwinPart::Law(part) => {
+                if part.is_behind_noise() {
                     outputs = Outputs::Drawn(outputs.drawn(noise));
                 }
-                part.pass(theta, drive, outputs.signal());
-            }
-            TwinPart::MeasurementNoise { target, level } => {
-                let source = format!("sensor-noise/{target}");
-                let level = (level.law)(level.m(theta));
-                outputs.add(NoisePart::white(*target, level, source), noise);
+                match &part.law {
+                    Law::Sensor(law) | Law::Reading(law) => {
+                        part.pass(law.as_ref(), theta, drive, outputs.signal());
+                    }
+                    Law::MeasurementNoise(law) => {
+                        let source = format!("sensor-noise/{}", part.target);
+                        let level = law(part.m(theta));
+                        outputs.add(NoisePart::white(part.target, level, source), noise);
+                    }
+                    _ => part.finish(theta, noise, outputs.signal()),
+                }
             }
             TwinPart::White(white) => white.parts(theta).for_each(|part| outputs.add(part, noise)),
             TwinPart::Disturbance(part) => {
                 if let Entry::Sensor(output) = part.entry {
                     outputs.add(disturbance(part, output, theta), noise);
                 }
-            }
-            TwinPart::Rounding { .. } | TwinPart::Outliers { .. } => {
-                let mut drawn = outputs.drawn(noise);
-                part.finish(theta, noise, &mut drawn);
-                outputs = Outputs::Drawn(drawn);
             }
             _ => {}
         }
@@ -201,26 +205,22 @@ impl ComposedBlackBox {
     fn followed(
         &self,
         inside: &[Added],
-        (theta, entry): (&[f64], usize),
-        change: &Placed<dyn ParameterChange>,
+        (part, law): (&LawPart, &dyn ParameterChange),
+        theta: &[f64],
         (drive, noise): (&Drive, Noise),
     ) -> Result<Outputs, SimulationError> {
-        let m = change.m(theta);
+        let m = part.m(theta);
         let by: Vec<f64> = (0..drive.samples())
             .map(|k| {
-                let now = Now::new(drive.time(k), drive.step(k), drive.input(k), theta);
-                change
-                    .law
-                    .value(m, &now, &[], 1.0)
-                    .ln()
-                    .clamp(-LARGEST, LARGEST)
+                let now = Now::new(drive.time(k), drive.step(k), drive.input(k), &[]);
+                (law.value(m, &now, &[], 1.0).ln()).clamp(-LARGEST, LARGEST)
             })
             .collect();
         let low = by.iter().copied().fold(f64::INFINITY, f64::min);
         let high = by.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let at = |change: f64| {
             let mut theta = Theta::from_slice(theta);
-            theta[entry] *= change.exp();
+            theta[part.target] *= change.exp();
             self.outputs(inside, &theta, drive, noise)
         };
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));

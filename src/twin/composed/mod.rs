@@ -32,8 +32,8 @@ pub(in crate::twin) use digital_twin::FREE_RUNS;
 pub(crate) use known_noise::{KnownNoise, NoisePart};
 pub(crate) use levels::{FittedLevels, LevelSource, Setting};
 pub(crate) use part::{
-    Disturbance, Entry, LARGEST, NoiseLaw, OutlierLaw, OutputChannel, ParameterChange, Placed,
-    RateChange, SignalChange, SignalPart, StateLimit, StatePair, TwinPart,
+    Disturbance, Entry, LARGEST, Law, LawPart, LawPlace, NoiseLaw, OutlierLaw, ParameterChange,
+    RateChange, SignalChange, StateLimit, TwinPart,
 };
 pub(crate) use sensor_noise::{SensorNoise, WhiteLevel};
 pub(crate) use simulation::DeadTime;
@@ -173,15 +173,14 @@ impl Composed {
         let mut theta = Theta::from_slice(own);
         for added in parts.list.iter().rev() {
             match (&added.part, x) {
-                (TwinPart::Parameter { entry, change }, x)
-                    if x.is_some() || !change.law.sees_states() =>
-                {
-                    let at = Now {
-                        t: parts.time(now, added.delays),
-                        ..*now
-                    };
-                    let (value, m) = (&mut theta[*entry], change.m(now.theta));
-                    *value = change.law.value(m, &at, x.unwrap_or(&[]), *value);
+                (TwinPart::Law(part), x) => {
+                    if let Law::Parameter(law) = &part.law
+                        && (x.is_some() || !law.sees_states())
+                    {
+                        let at = parts.behind(now, added.delays);
+                        let value = &mut theta[part.target];
+                        *value = law.value(part.m(now.theta), &at, x.unwrap_or(&[]), *value);
+                    }
                 }
                 (TwinPart::Disturbance(part), Some(x)) => {
                     if let Entry::Parameter(entry) = part.entry {
@@ -237,11 +236,11 @@ impl Composed {
     /// signals that are rounded to it, whatever the offset of the steps.
     pub(crate) fn rounding(&self, theta: &[f64]) -> Vec<f64> {
         let (mut all, theta) = (vec![], self.complete(theta));
-        for added in &self.parts.list {
-            if let TwinPart::Rounding { target, step } = &added.part {
+        for part in self.parts.laws() {
+            if let Law::Rounding(step) = &part.law {
                 all.resize(self.outputs(), 0.0);
-                let own: f64 = (step.law)(step.m(&theta));
-                all[*target] = own.max(all[*target]);
+                let own: f64 = step(part.m(&theta));
+                all[part.target] = own.max(all[part.target]);
             }
         }
         all
@@ -250,11 +249,11 @@ impl Composed {
     /// Returns probability and size of outliers, by output; empty without any.
     pub(crate) fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
         let (mut all, theta) = (vec![], self.complete(theta));
-        for added in &self.parts.list {
-            if let TwinPart::Outliers { target, law, .. } = &added.part {
-                let own = (law.law)(law.m(&theta));
+        for part in self.parts.laws() {
+            if let Law::Outliers(law) = &part.law {
+                let own = law(part.m(&theta));
                 all.resize(self.outputs(), Outliers::default());
-                let both: &mut Outliers = &mut all[*target];
+                let both: &mut Outliers = &mut all[part.target];
                 // Both are rare: their probabilities add up, and the larger ones are seen.
                 both.probability += own.probability;
                 both.scale = both.scale.max(own.scale);
@@ -266,8 +265,8 @@ impl Composed {
     /// Rounds finished outputs, and adds outliers, which are drawn over the whole record.
     pub(crate) fn finish(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
         let theta = self.complete(theta);
-        for added in &self.parts.list {
-            added.part.finish(&theta, noise, outputs);
+        for part in self.parts.laws() {
+            part.finish(&theta, noise, outputs);
         }
     }
 }
@@ -291,25 +290,21 @@ impl Parts {
     }
 }
 
-impl TwinPart {
-    /// Rounds the finished channel of a part to multiples of its step, halves upwards, or adds its outliers.
+impl LawPart {
+    /// Rounds its finished channel to multiples of its step, halves upwards, or adds its outliers.
     fn finish(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
-        match self {
-            Self::Rounding { target, step } => {
-                let step = (step.law)(step.m(theta));
+        let m = self.m(theta);
+        match &self.law {
+            Law::Rounding(step) => {
+                let step = step(m);
                 if step > 0.0 {
-                    (outputs.column_mut(*target))
+                    (outputs.column_mut(self.target))
                         .mapv_inplace(|value| step * (value / step + 0.5).floor());
                 }
             }
-            Self::Outliers {
-                target,
-                law,
-                source,
-            } => {
-                let hits = (law.law)(law.m(theta));
-                let mut source = noise.source(source);
-                for value in outputs.column_mut(*target) {
+            Law::Outliers(law) => {
+                let (hits, mut source) = (law(m), noise.source(&self.name));
+                for value in outputs.column_mut(self.target) {
                     // Both draws always, so that other magnitudes see the same draws.
                     let (hit, size) = (source.happens(hits.probability), source.normal());
                     *value += if hit { hits.scale * size } else { 0.0 };

@@ -1,7 +1,7 @@
 //! Motion of composed equations, of as many points as are given.
 
 use super::parts::Theta;
-use super::{Composed, Entry, TwinPart};
+use super::{Composed, Entry, Law, TwinPart};
 use crate::math::{LANES, Lanes};
 use crate::twin::points::{
     LanePoints, Layout, Points, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes,
@@ -65,12 +65,12 @@ impl Composed {
         let at = self.layout();
         for added in &self.parts.list {
             match &added.part {
-                TwinPart::Rate { on, change } => {
-                    let seen = Now {
-                        t: self.parts.time(now, added.delays),
-                        ..*own
-                    };
-                    (change.law).push(change.m(now.theta), &seen, *on, at, x, dx);
+                TwinPart::Law(part) => {
+                    if let Law::Force(law) = &part.law {
+                        let t = self.parts.time(now, added.delays);
+                        let (seen, on) = (Now { t, ..*own }, part.place(&added.states));
+                        law.push(part.m(now.theta), &seen, &on, (at, x), dx);
+                    }
                 }
                 TwinPart::Late(_) => {
                     if let Some(share) = self.parts.moving(now, added.delays) {
@@ -94,8 +94,10 @@ impl Composed {
         let at = self.layout();
         if self.parts.acts.on_limits {
             for added in self.parts.list.iter().rev() {
-                if let TwinPart::Limit { on, limit } = &added.part {
-                    limit.law.hold(limit.m(now.theta), *on, at, x);
+                if let TwinPart::Law(part) = &added.part
+                    && let Law::Limit(law) = &part.law
+                {
+                    law.hold(part.m(now.theta), &part.place(&added.states), at, x);
                 }
             }
         }

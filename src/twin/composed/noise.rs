@@ -1,6 +1,6 @@
 //! Noise levels of composed equations.
 
-use super::{Composed, Disturbance, TwinPart};
+use super::{Composed, Disturbance, Law, TwinPart};
 use crate::twin::Now;
 
 impl Composed {
@@ -19,11 +19,15 @@ impl Composed {
                 let dt = added.step.unwrap_or(now.dt);
                 let now = &Now { dt, ..*now };
                 match &added.part {
-                    TwinPart::ProcessNoise { target, level } => {
-                        join(&mut process[*target], (level.law)(level.m(now.theta)));
-                    }
-                    TwinPart::MeasurementNoise { target, level } => {
-                        join(&mut measurement[*target], (level.law)(level.m(now.theta)));
+                    TwinPart::Law(part) => {
+                        let m = part.m(now.theta);
+                        match &part.law {
+                            Law::ProcessNoise(law) => join(&mut process[part.target], law(m)),
+                            Law::MeasurementNoise(law) => {
+                                join(&mut measurement[part.target], law(m));
+                            }
+                            _ => {}
+                        }
                     }
                     TwinPart::Level {
                         is_process,

@@ -16,22 +16,15 @@ pub(crate) type ParameterCheck = dyn Fn(&[f64], f64) -> Result<(), SimulationErr
 /// A call before each run of a twin; its error stops the run.
 pub(crate) type Hook = dyn Fn() -> Result<(), SimulationError> + Send + Sync;
 
-/// A channel of the outputs of several points, and the memory of its law in their states.
+/// Place in a twin at which a law acts.
 #[derive(Debug, Clone)]
-pub(crate) struct OutputChannel {
-    /// Memory values in the state.
-    pub memory: Range<usize>,
-    /// Index of the channel.
+pub(crate) struct LawPlace {
+    /// Index of the channel or the state that it bends.
     pub target: usize,
-}
-
-/// Target and other state of a law on states.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct StatePair {
-    /// Index of the target.
-    pub target: usize,
-    /// Index of the other state.
+    /// Index of the other state of a law between two.
     pub other: Option<usize>,
+    /// Values that it remembers, in the state.
+    pub memory: Range<usize>,
 }
 
 /// Change of a signal, over several points at once; `m` are its magnitudes.
@@ -41,7 +34,7 @@ pub(crate) trait SignalChange: Send + Sync {
         &self,
         m: &[f64],
         now: &Now<'_>,
-        on: &OutputChannel,
+        on: &LawPlace,
         (at, x): (Layout, &mut [f64]),
         outputs: (usize, &mut [f64]),
     ) {
@@ -53,7 +46,7 @@ pub(crate) trait SignalChange: Send + Sync {
         &self,
         m: &[f64],
         now: &Now<'_>,
-        on: &OutputChannel,
+        on: &LawPlace,
         states: (Layout, &[f64]),
         outputs: (usize, &mut [f64]),
     );
@@ -62,9 +55,10 @@ pub(crate) trait SignalChange: Send + Sync {
 impl dyn SignalChange {
     /// Returns one value behind a law without memory.
     pub(crate) fn value(&self, m: &[f64], now: &Now<'_>, s: f64) -> f64 {
-        let on = OutputChannel {
-            memory: 0..0,
+        let on = LawPlace {
             target: 0,
+            other: None,
+            memory: 0..0,
         };
         let mut y = [s];
         self.peek(m, now, &on, (Layout::dense(1), &[0.0]), (1, &mut y));
@@ -75,13 +69,20 @@ impl dyn SignalChange {
 /// Addition to the rate of a state, over several points at once.
 pub(crate) trait RateChange: Send + Sync {
     /// Adds to the rates of points; `now` holds the twin's own θ.
-    fn push(&self, m: &[f64], now: &Now<'_>, on: StatePair, at: Layout, x: &[f64], dx: &mut [f64]);
+    fn push(
+        &self,
+        m: &[f64],
+        now: &Now<'_>,
+        on: &LawPlace,
+        states: (Layout, &[f64]),
+        dx: &mut [f64],
+    );
 }
 
 /// Limit of a state after each step, over several points at once.
 pub(crate) trait StateLimit: Send + Sync {
     /// Bends the target and the other state of points.
-    fn hold(&self, m: &[f64], on: StatePair, at: Layout, x: &mut [f64]);
+    fn hold(&self, m: &[f64], on: &LawPlace, at: Layout, x: &mut [f64]);
 }
 
 /// Change of a parameter while the twin runs.
@@ -95,45 +96,83 @@ pub(crate) trait ParameterChange: Send + Sync {
     }
 }
 
-/// A law, and where its magnitudes stand in θ.
-#[derive(Debug)]
-pub(crate) struct Placed<L: ?Sized> {
-    pub law: Arc<L>,
+/// A function of magnitudes and of what it bends, over several points at once.
+#[derive(Clone)]
+pub(crate) enum Law {
+    /// An output signal, before its noise.
+    Sensor(Arc<dyn SignalChange>),
+    /// An output signal behind its noise; nothing is remembered there.
+    Reading(Arc<dyn SignalChange>),
+    /// An input signal.
+    Actuator(Arc<dyn SignalChange>),
+    /// The rate of a state.
+    Force(Arc<dyn RateChange>),
+    /// A limit on a state, after each step.
+    Limit(Arc<dyn StateLimit>),
+    /// A parameter over time, or with the states.
+    Parameter(Arc<dyn ParameterChange>),
+    /// The noise of an output: a standard deviation that joins the twin's own in quadrature.
+    MeasurementNoise(Arc<NoiseLaw>),
+    /// The noise of a state.
+    ProcessNoise(Arc<NoiseLaw>),
+    /// Rounding of a finished output, halves upwards: the law is the step.
+    Rounding(Arc<NoiseLaw>),
+    /// Rare large errors of a finished output.
+    Outliers(Arc<OutlierLaw>),
+}
+
+/// A law, what it bends, and where its magnitudes stand in θ.
+#[derive(Clone)]
+pub(crate) struct LawPart {
+    pub law: Law,
+    /// Name, from which its memory in the state has those of its values, and by which its errors are drawn.
+    pub name: String,
+    /// Index of the channel or state, or entry of θ.
+    pub target: usize,
+    /// Index of the other state of a law between two.
+    pub other: Option<usize>,
     /// Entries of θ, held ones counted.
     pub magnitudes: Range<usize>,
+    /// Number of values that it remembers; they begin at the first value of the signal.
+    pub memory: usize,
+    /// `true` where it shows the signal as it was so many seconds ago, its first magnitude.
+    pub is_dead_time: bool,
 }
 
-impl<L: ?Sized> Clone for Placed<L> {
-    fn clone(&self) -> Self {
+impl LawPart {
+    /// Creates a part without memory.
+    pub fn new(law: Law, name: String, target: usize, magnitudes: Range<usize>) -> Self {
         Self {
-            law: self.law.clone(),
-            magnitudes: self.magnitudes.clone(),
+            law,
+            name,
+            target,
+            other: None,
+            magnitudes,
+            memory: 0,
+            is_dead_time: false,
         }
     }
-}
 
-impl<L: ?Sized> Placed<L> {
     /// Returns the magnitudes.
     #[inline]
     pub fn m<'t>(&self, theta: &'t [f64]) -> &'t [f64] {
         &theta[self.magnitudes.clone()]
     }
-}
 
-/// A change of one signal.
-#[derive(Clone)]
-pub(crate) struct SignalPart {
-    /// Name, from which its memory in the state has those of its values.
-    pub name: String,
-    /// Index of the channel.
-    pub target: usize,
-    /// Number of values that it remembers; they begin at the first value of the signal.
-    pub memory: usize,
-    /// `true` where it stands behind the noise of measurement; it then remembers nothing.
-    pub is_of_readings: bool,
-    /// `true` where it shows the signal as it was so many seconds ago, its first magnitude.
-    pub is_dead_time: bool,
-    pub change: Placed<dyn SignalChange>,
+    /// Returns whether it acts on outputs with their noise.
+    pub fn is_behind_noise(&self) -> bool {
+        matches!(self.law, Law::Reading(_) | Law::Rounding(_) | Law::Outliers(_))
+    }
+
+    /// Returns its place, its memory being these states.
+    #[inline]
+    pub fn place(&self, memory: &Range<usize>) -> LawPlace {
+        LawPlace {
+            target: self.target,
+            other: self.other,
+            memory: memory.clone(),
+        }
+    }
 }
 
 /// Point at which a disturbance or a function enters.
@@ -185,39 +224,12 @@ impl Disturbance {
 /// A part of a composed twin. Entries of θ count held parameters, too.
 #[derive(Clone)]
 pub(crate) enum TwinPart {
-    /// Change of a parameter over time, or with the states.
-    Parameter {
-        entry: usize,
-        change: Placed<dyn ParameterChange>,
-    },
-    /// Force on a state.
-    Rate {
-        on: StatePair,
-        change: Placed<dyn RateChange>,
-    },
-    /// Limit of a state that is no box.
-    Limit {
-        on: StatePair,
-        limit: Placed<dyn StateLimit>,
-    },
+    /// A law on signals, states, parameters or noise.
+    Law(LawPart),
     /// Box of a state.
     Box { state: usize, limit: Interval },
-    /// Change of an output.
-    Sensor(SignalPart),
-    /// Change of an input.
-    Actuator(SignalPart),
     /// Delay of the whole twin, by the sum of these entries of θ in seconds.
     Late(Vec<usize>),
-    /// Noise of a state, joined to its own.
-    ProcessNoise {
-        target: usize,
-        level: Placed<NoiseLaw>,
-    },
-    /// Noise of an output, joined to its own.
-    MeasurementNoise {
-        target: usize,
-        level: Placed<NoiseLaw>,
-    },
     /// Noise level of a state or an output in place of the twin's own; a state's is that of the increment in `step`.
     Level {
         is_process: bool,
@@ -237,17 +249,6 @@ pub(crate) enum TwinPart {
     },
     /// Standard deviation of a start for which none is declared.
     UncertainStart { state: usize, std: f64 },
-    /// Rounding of a finished output, halves upwards.
-    Rounding {
-        target: usize,
-        step: Placed<NoiseLaw>,
-    },
-    /// Rare large errors of a finished output, drawn by this name.
-    Outliers {
-        target: usize,
-        law: Placed<OutlierLaw>,
-        source: String,
-    },
     /// A disturbance, for which equations have a state more.
     Disturbance(Disturbance),
     /// Integrator and stepping in place of the twin's own.

@@ -1,6 +1,6 @@
 //! The list of parts of a twin, and the inside of its delays.
 
-use super::part::{Disturbance, Entry, TwinPart};
+use super::part::{Disturbance, Entry, Law, LawPart, TwinPart};
 use crate::record::Quantity;
 use crate::twin::{
     Integrator, Interval, Now, Outline, Parameter, ParameterSpace, Stepping, TwinError,
@@ -73,25 +73,12 @@ pub(in crate::twin) struct Acts {
 impl Acts {
     fn add(&mut self, part: &TwinPart) {
         match part {
-            TwinPart::Parameter { change, .. } => {
-                self.on_parameters = true;
-                self.by_states |= change.law.sees_states();
-            }
-            TwinPart::Rate { .. } => self.on_rates = true,
+            TwinPart::Law(part) => self.add_law(part),
             TwinPart::Late(_) => (self.on_rates, self.on_noise) = (true, true),
-            TwinPart::Limit { .. } => self.on_limits = true,
-            TwinPart::Sensor(part) if part.is_of_readings => self.on_readings = true,
-            TwinPart::Sensor(part) => {
-                self.on_outputs = true;
-                self.in_sensors |= part.memory > 0;
-            }
             TwinPart::Unit(_) => {
                 (self.on_outputs, self.on_noise, self.on_readings) = (true, true, true);
             }
-            TwinPart::ProcessNoise { .. }
-            | TwinPart::MeasurementNoise { .. }
-            | TwinPart::Level { .. }
-            | TwinPart::Levels(_) => self.on_noise = true,
+            TwinPart::Level { .. } | TwinPart::Levels(_) => self.on_noise = true,
             TwinPart::Start { .. } | TwinPart::UncertainStart { .. } => self.on_start = true,
             TwinPart::Disturbance(part) => {
                 (self.in_disturbances, self.on_noise, self.on_start) = (true, true, true);
@@ -103,6 +90,24 @@ impl Acts {
                 }
             }
             _ => {}
+        }
+    }
+
+    fn add_law(&mut self, part: &LawPart) {
+        match &part.law {
+            Law::Parameter(law) => {
+                self.on_parameters = true;
+                self.by_states |= law.sees_states();
+            }
+            Law::Force(_) => self.on_rates = true,
+            Law::Limit(_) => self.on_limits = true,
+            Law::Reading(_) => self.on_readings = true,
+            Law::Sensor(_) => {
+                self.on_outputs = true;
+                self.in_sensors |= part.memory > 0;
+            }
+            Law::MeasurementNoise(_) | Law::ProcessNoise(_) => self.on_noise = true,
+            Law::Actuator(_) | Law::Rounding(_) | Law::Outliers(_) => {}
         }
     }
 
@@ -197,12 +202,15 @@ impl Parts {
         }
         let (mut late, mut inputs, mut inside, mut outside) = (vec![], vec![], vec![], vec![]);
         for part in parts {
-            match part {
+            match &part {
                 TwinPart::Late(_) => late.push(part),
-                TwinPart::Actuator(_) => inputs.insert(0, part),
-                TwinPart::Parameter { .. } | TwinPart::Limit { .. } => inside.insert(0, part),
-                TwinPart::Rate { .. } => inside.push(part),
-                part => outside.push(part),
+                TwinPart::Law(LawPart { law, .. }) => match law {
+                    Law::Actuator(_) => inputs.insert(0, part),
+                    Law::Parameter(_) | Law::Limit(_) => inside.insert(0, part),
+                    Law::Force(_) => inside.push(part),
+                    _ => outside.push(part),
+                },
+                _ => outside.push(part),
             }
         }
         for part in [inside, late, outside, inputs].into_iter().flatten() {
@@ -219,7 +227,7 @@ impl Parts {
                 (self.integrator, self.stepping) = (*integrator, *stepping);
             }
             TwinPart::Late(entries) => self.delays.push(entries.clone()),
-            TwinPart::Sensor(part) if !part.is_of_readings => {
+            TwinPart::Law(part) if matches!(part.law, Law::Sensor(_)) => {
                 let memory = match part.is_dead_time {
                     true => BETWEEN_SAMPLES,
                     false => part.memory,
@@ -261,6 +269,14 @@ impl Parts {
         !(self.acts.on_readings || self.acts.on_parameters) && self.delays.is_empty()
     }
 
+    /// Returns the laws.
+    pub fn laws(&self) -> impl Iterator<Item = &LawPart> {
+        self.list.iter().filter_map(|added| match &added.part {
+            TwinPart::Law(part) => Some(part),
+            _ => None,
+        })
+    }
+
     /// Returns the disturbances of equations, each with the index of its state.
     pub fn disturbances(&self) -> impl Iterator<Item = (&Added, &Disturbance, usize)> {
         self.list.iter().filter_map(|added| match &added.part {
@@ -284,6 +300,14 @@ impl Parts {
         delays
             .fold(now.t, |t, delay| t - self.delay(delay, now.theta))
             .max(0.0)
+    }
+
+    /// Returns `now` as laws of signals and parameters see it: behind the delays from this index on, with no θ but their magnitudes.
+    #[inline]
+    pub fn behind<'n>(&self, now: &Now<'n>, delays: usize) -> Now<'n> {
+        let t = self.time(now, delays);
+        let theta = &[];
+        Now { t, theta, ..*now }
     }
 
     /// Returns the share of a step in which what is behind a delay moves; `None` for all of it.

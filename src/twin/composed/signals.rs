@@ -1,7 +1,7 @@
 //! Outputs, starts and inputs of composed equations.
 
 use super::parts::{Added, Theta};
-use super::{Composed, Disturbance, Entry, OutputChannel, SignalPart, TwinPart};
+use super::{Composed, Disturbance, Entry, Law, LawPart, LawPlace, SignalChange, TwinPart};
 use crate::record::{Drive, RecordError, Signal};
 use crate::twin::points::Layout;
 use crate::twin::{Now, SimulationError};
@@ -28,12 +28,14 @@ impl Composed {
     fn look(&self, added: &Added, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
         let (n, p) = (self.states(), self.outputs());
         match &added.part {
-            TwinPart::Sensor(part) if !part.is_of_readings => {
-                let now = self.behind(now, added.delays);
-                let on = part.channel(added);
-                part.magnitudes(&now, |m| {
-                    (part.change.law).peek(m, &now, &on, (Layout::dense(n), x), (p, y));
-                });
+            TwinPart::Law(part) => {
+                if let Law::Sensor(law) = &part.law {
+                    let at = self.parts.behind(now, added.delays);
+                    let on = part.place(&added.states);
+                    part.magnitudes(now, |m| {
+                        law.peek(m, &at, &on, (Layout::dense(n), x), (p, y));
+                    });
+                }
             }
             TwinPart::Disturbance(part) => {
                 if let Entry::Sensor(target) = part.entry {
@@ -51,15 +53,6 @@ impl Composed {
     #[inline]
     pub(super) fn outputs(&self) -> usize {
         self.parts.outline.outputs.len()
-    }
-
-    /// Time behind the delays from this index on.
-    #[inline]
-    fn behind<'n>(&self, now: &Now<'n>, delays: usize) -> Now<'n> {
-        Now {
-            t: self.parts.time(now, delays),
-            ..*now
-        }
     }
 
     fn own_outputs(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
@@ -93,13 +86,14 @@ impl Composed {
             self.own_outputs(now, x, y);
             for added in &self.parts.list {
                 match &added.part {
-                    TwinPart::Sensor(part)
-                        if !part.is_of_readings && self.parts.moves(now, added.delays) =>
-                    {
-                        let (at, on) = (self.behind(now, added.delays), part.channel(added));
-                        part.magnitudes(&at, |m| {
-                            (part.change.law).pass(m, &at, &on, (Layout::dense(n), x), (p, y));
-                        });
+                    TwinPart::Law(part) if self.parts.moves(now, added.delays) => {
+                        if let Law::Sensor(law) = &part.law {
+                            let at = self.parts.behind(now, added.delays);
+                            let on = part.place(&added.states);
+                            part.magnitudes(now, |m| {
+                                law.pass(m, &at, &on, (Layout::dense(n), x), (p, y));
+                            });
+                        }
                     }
                     _ => self.look(added, now, x, y),
                 }
@@ -123,16 +117,16 @@ impl Composed {
             for added in &self.parts.list {
                 match &added.part {
                     TwinPart::Unit(factor) => y.iter_mut().for_each(|y| *y *= factor),
-                    // Behind the noise nobody remembers.
-                    TwinPart::Sensor(part) if part.is_of_readings => {
-                        let before = Theta::from_slice(y);
-                        let (now, on) = (self.behind(now, added.delays), part.channel(added));
-                        let (m, states) = (part.change.m(now.theta), (Layout::dense(1), &[][..]));
-                        (part.change.law).peek(m, &now, &on, states, (p, y));
-                        changed |= before
-                            .iter()
-                            .zip(&*y)
-                            .any(|(a, b)| a.to_bits() != b.to_bits());
+                    TwinPart::Law(part) => {
+                        let Law::Reading(law) = &part.law else {
+                            continue;
+                        };
+                        let (before, on) = (Theta::from_slice(y), part.place(&added.states));
+                        let at = self.parts.behind(now, added.delays);
+                        // Behind the noise nobody remembers.
+                        let states = (Layout::dense(1), &[][..]);
+                        law.peek(part.m(now.theta), &at, &on, states, (p, y));
+                        changed |= (before.iter().zip(&*y)).any(|(a, b)| a.to_bits() != b.to_bits());
                     }
                     _ => {}
                 }
@@ -165,7 +159,9 @@ impl Composed {
             let mut y = Theta::from_elem(0.0, self.outputs());
             self.own_outputs(now, x, &mut y);
             for added in &self.parts.list {
-                if let TwinPart::Sensor(part) = &added.part {
+                if let TwinPart::Law(part) = &added.part
+                    && !added.states.is_empty()
+                {
                     x[added.states.clone()].fill(y[part.target]);
                 }
                 self.look(added, now, x, &mut y);
@@ -201,13 +197,11 @@ impl Composed {
     /// earlier.
     pub(crate) fn dead_time(&self, theta: &[f64], dt: f64) -> Vec<usize> {
         let mut all = vec![];
-        for added in &self.parts.list {
-            if let TwinPart::Sensor(part) = &added.part
-                && part.is_dead_time
-            {
+        for part in self.parts.laws().filter(|part| part.is_dead_time) {
+            if let Law::Sensor(_) = part.law {
                 all.resize(self.outputs(), 0);
                 let theta = self.complete(theta);
-                all[part.target] += whole_samples(part.change.m(&theta)[0], dt);
+                all[part.target] += whole_samples(part.m(&theta)[0], dt);
             }
         }
         all
@@ -225,9 +219,12 @@ impl Composed {
         for added in self.parts.list.iter().rev() {
             let before = acting.as_ref().unwrap_or(drive);
             acting = Some(match &added.part {
-                TwinPart::Actuator(part) => part.act(&theta, before)?,
+                TwinPart::Law(part) => match &part.law {
+                    Law::Actuator(law) => part.act(law.as_ref(), &theta, before)?,
+                    _ => continue,
+                },
                 TwinPart::Late(_) => (before.late(self.parts.delay(added.delays, &theta)))
-                    .map_err(|error| SimulationError::Fatal(error.into()))?,
+                    .map_err(SimulationError::of)?,
                 _ => continue,
             });
         }
@@ -235,51 +232,54 @@ impl Composed {
     }
 }
 
-impl SignalPart {
+impl LawPart {
     /// Calls `then` with its magnitudes; a dead time loses its whole samples.
     #[inline]
     fn magnitudes<R>(&self, now: &Now<'_>, then: impl FnOnce(&[f64]) -> R) -> R {
-        let m = self.change.m(now.theta);
+        let m = self.m(now.theta);
         match self.is_dead_time {
             true => then(&[m[0] - whole_samples(m[0], now.dt) as f64 * now.dt]),
             false => then(m),
         }
     }
 
-    #[inline]
-    fn channel(&self, added: &Added) -> OutputChannel {
-        OutputChannel {
-            memory: added.states.clone(),
-            target: self.target,
-        }
-    }
-
-    /// Passes its channel of a whole signal through the law.
-    pub(super) fn pass(&self, theta: &[f64], drive: &Drive, signal: &mut Signal) {
-        let m = self.change.m(theta);
+    /// Passes its channel of a whole signal through its law.
+    pub(super) fn pass(
+        &self,
+        law: &dyn SignalChange,
+        theta: &[f64],
+        drive: &Drive,
+        signal: &mut Signal,
+    ) {
         let mut memory = vec![signal[[0, self.target]]; self.memory];
-        let on = OutputChannel {
-            memory: 0..self.memory,
+        let on = LawPlace {
             target: 0,
+            other: None,
+            memory: 0..self.memory,
         };
         let at = Layout::dense(self.memory.max(1));
         memory.resize(self.memory.max(1), 0.0);
         for (k, value) in signal.column_mut(self.target).iter_mut().enumerate() {
-            let now = Now::new(drive.time(k), drive.step(k), drive.input(k), theta);
+            let now = Now::new(drive.time(k), drive.step(k), drive.input(k), &[]);
             let value = std::slice::from_mut(value);
-            (self.change.law).pass(m, &now, &on, (at, &mut memory), (1, value));
+            law.pass(self.m(theta), &now, &on, (at, &mut memory), (1, value));
         }
     }
 
-    /// Returns the drive behind this part.
-    pub(super) fn act(&self, theta: &[f64], drive: &Drive) -> Result<Drive, SimulationError> {
+    /// Returns the drive behind its law.
+    pub(super) fn act(
+        &self,
+        law: &dyn SignalChange,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Drive, SimulationError> {
         let mut inputs = drive.inputs().clone();
-        self.pass(theta, drive, &mut inputs);
+        self.pass(law, theta, drive, &mut inputs);
         drive.with_inputs(inputs).map_err(|error| match error {
             RecordError::NotFinite { sample, .. } => SimulationError::Diverged {
                 at: drive.time(sample),
             },
-            error => SimulationError::Fatal(error.into()),
+            error => SimulationError::of(error),
         })
     }
 }
