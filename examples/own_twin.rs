@@ -6,7 +6,8 @@ use truetwin::network::layers::*;
 use truetwin::prelude::*;
 
 /// A leaking tank: area·ḣ = u − k·h.
-struct Tank;
+#[derive(Debug)]
+pub struct Tank;
 
 impl StateSpace for Tank {
     fn outline(&self) -> Outline {

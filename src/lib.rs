@@ -96,6 +96,10 @@ macro_rules! debug_by_name {
     };
 }
 
+// Unit tests include examples, which name the crate.
+#[cfg(test)]
+extern crate self as truetwin;
+
 // Rooms, lowest first; a room uses only what stands above it here (tests/house/layering.rs holds it so).
 pub mod setting;
 

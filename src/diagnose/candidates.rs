@@ -1,11 +1,11 @@
 //! Effects that a study lets a diagnosis name.
 
 use crate::effect::{Effect, EffectKey, EffectPattern};
-use crate::twin::Law;
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::merged;
 use crate::hypothesis::term::Term;
 use crate::study::{Study, StudyError};
+use crate::twin::Law;
 use std::sync::Arc;
 
 /// Every listed effect that the study lets a diagnosis name, in the units of the record.

@@ -1,11 +1,15 @@
-//! All effects that a program knows, and where in a twin each can stand.
+//! All effects that a program knows, where in a twin each can stand, and files of them.
 
 use super::check::targets;
 use super::key::EffectPattern;
 use super::kind::{EffectKind, OtherState};
 use super::library;
 use super::placed::{Effect, EffectEntry};
+use crate::setting::did_you_mean;
+use crate::storage::untrusted::{check_names, message, read_text};
 use crate::twin::{Composed, Outline, ParameterSpace, Role, Twin, TwinError, is_memory};
+use serde::Deserialize;
+use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
@@ -38,11 +42,12 @@ impl Catalogue {
 
     fn kind(&self, id: &str) -> Result<&Arc<EffectKind>, TwinError> {
         let known = self.0.iter().find(|kind| kind.id() == id);
-        known.ok_or_else(|| TwinError::UnknownEffect {
-            id: id.into(),
-            known: (self.0.iter().map(|kind| kind.id()))
-                .collect::<Vec<_>>()
-                .join(", "),
+        known.ok_or_else(|| {
+            let known: Vec<&str> = self.0.iter().map(|kind| kind.id()).collect();
+            let meant = did_you_mean(id, known.iter().copied());
+            let known = known.join(", ");
+            let problem = format!("unknown effect id \"{id}\"{meant}; choose one of {known}");
+            TwinError::effect("id", problem)
         })
     }
 
@@ -116,6 +121,65 @@ fn rates(twin: &Composed) -> Vec<(String, String)> {
     (crate::twin::rates(twin).into_iter())
         .map(|(i, j)| (name(i), name(j)))
         .collect()
+}
+
+/// Longest effect file, in bytes: thousands of effects.
+const LARGEST_FILE: u64 = 1 << 20;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EffectFile {
+    #[serde(default)]
+    effect: Vec<toml::Spanned<toml::Value>>,
+}
+
+impl Catalogue {
+    /// Reads effects from the text of a file.
+    ///
+    /// Targets and magnitudes are checked when the effects are added to a twin.
+    pub fn parse(&self, text: &str) -> Result<Vec<Effect>, TwinError> {
+        self.parse_file(text, Path::new("effects"))
+    }
+
+    /// Reads effects from a file.
+    pub fn read(&self, path: &Path) -> Result<Vec<Effect>, TwinError> {
+        let text = read_text(path, LARGEST_FILE).map_err(|error| TwinError::EffectFile {
+            path: path.into(),
+            error: error.to_string(),
+        })?;
+        self.parse_file(&text, path)
+    }
+
+    fn parse_file(&self, text: &str, path: &Path) -> Result<Vec<Effect>, TwinError> {
+        if let Ok(table) = toml::from_str(text) {
+            check_names(&table).map_err(|problem| TwinError::EffectText {
+                path: path.into(),
+                line: 1,
+                problem,
+            })?;
+        }
+        let at = |byte: usize, problem: &str| {
+            let lines = problem.lines().map(str::trim);
+            let lines: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
+            TwinError::EffectText {
+                path: path.into(),
+                line: 1 + text.bytes().take(byte).filter(|b| *b == b'\n').count(),
+                problem: message(&lines.join(", ")),
+            }
+        };
+        let file: EffectFile = toml::from_str(text)
+            .map_err(|error| at(error.span().map_or(0, |span| span.start), error.message()))?;
+        (file.effect.into_iter())
+            .map(|table| {
+                // Each effect for itself: an error inside then points at its own [[effect]].
+                let start = table.span().start;
+                let entry = EffectEntry::deserialize(table.into_inner())
+                    .map_err(|error| at(start, error.message()))?;
+                self.resolve(&entry)
+                    .map_err(|error| at(start, &error.to_string()))
+            })
+            .collect()
+    }
 }
 
 #[cfg(test)]

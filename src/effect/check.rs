@@ -1,8 +1,10 @@
 //! Effects against the twin that they are added to.
 
+use super::kind::OtherState;
 use super::law::{NOISE_ENTERS, TargetKind};
 use super::placed::Effect;
 use crate::record::Signals;
+use crate::setting::{did_you_mean, number};
 use crate::twin::{Law, Outline, TwinError, is_memory};
 
 /// Returns the names of all targets of a kind, in a twin with these equations (none: a black box) and signals.
@@ -35,14 +37,19 @@ pub(crate) fn check_effects(
 ) -> Result<(), TwinError> {
     for effect in effects {
         check_place(effect, outline, signals)?;
-        let (id, target) = (effect.id().to_owned(), effect.target().to_owned());
         let same = effects.iter().filter(|other| other.key() == effect.key());
         if same.count() > 1 {
-            return Err(TwinError::DuplicateEffect { id, target });
+            let problem = format!(" on {} is given twice; give it once", effect.target());
+            return Err(refused(effect, "target", &problem));
         }
         check_given(effect)?;
     }
     Ok(())
+}
+
+/// Creates the error of an effect, at a key of its table.
+fn refused(effect: &Effect, key: &str, problem: &str) -> TwinError {
+    TwinError::effect(key, format!("effect {}{problem}", effect.id()))
 }
 
 fn check_place(
@@ -50,44 +57,40 @@ fn check_place(
     outline: Option<&Outline>,
     signals: &Signals,
 ) -> Result<(), TwinError> {
-    let (id, law) = (effect.id().to_owned(), effect.law());
-    let kind = law.target();
+    let (kind, target) = (effect.law().target(), effect.target());
     if outline.is_none() && !kind.is_signal() {
-        return Err(TwinError::EffectOnBlackBox { id });
+        let problem = " bends the equations, which a black-box twin does not show; only sensor and actuator effects can be added";
+        return Err(refused(effect, "id", problem));
     }
-    if matches!(law, Law::Sensor(_))
+    if matches!(effect.law(), Law::Sensor(_))
         && effect.kind().memory_values() > 0
         && effect.kind().position() > NOISE_ENTERS
     {
-        return Err(TwinError::EffectMemory {
-            id,
-            limit: NOISE_ENTERS,
-        });
+        let problem =
+            format!(" remembers and stands after the noise; give it an order below {NOISE_ENTERS}");
+        return Err(refused(effect, "id", &problem));
     }
     let known = targets(kind, outline, signals);
-    for name in [Some(effect.target()), effect.other()]
-        .into_iter()
-        .flatten()
-    {
+    let other = effect.kind().other_state().map_or("from", OtherState::key);
+    let places = [("target", Some(target)), (other, effect.other())];
+    for (key, name) in places.into_iter().filter_map(|(k, name)| Some((k, name?))) {
         if !known.iter().any(|k| k == name) {
-            return Err(TwinError::EffectTarget {
-                id,
-                what: kind.name(),
-                name: name.into(),
-                known: if known.is_empty() {
-                    "none: there is nothing of the kind".into()
-                } else {
-                    known.join(", ")
-                },
-            });
+            let known = match known.is_empty() {
+                true => "none: there is nothing of the kind".to_owned(),
+                false => known.join(", "),
+            };
+            let (what, meant) = (kind.name(), did_you_mean(name, known.split(", ")));
+            let problem =
+                format!(": the twin has no {what} \"{name}\"{meant}; choose one of {known}");
+            return Err(refused(effect, key, &problem));
         }
     }
     // A twin of a single state has no other one: there, what a limit takes is lost.
     let alone = known.iter().filter(|name| !is_memory(name)).count() == 1;
-    let lost = matches!(law, Law::Limit(_)) && alone;
-    if effect.other() == Some(effect.target()) && !lost {
-        let target = effect.target().to_owned();
-        return Err(TwinError::EffectOnItself { id, target });
+    let lost = matches!(effect.law(), Law::Limit(_)) && alone;
+    if effect.other() == Some(target) && !lost {
+        let problem = format!(" goes from {target} to itself; name another state");
+        return Err(refused(effect, other, &problem));
     }
     Ok(())
 }
@@ -95,23 +98,21 @@ fn check_place(
 fn check_given(effect: &Effect) -> Result<(), TwinError> {
     let declared = effect.magnitudes();
     for (name, &value) in effect.all_given() {
-        let id = effect.id().to_owned();
-        let Some(magnitude) = declared.iter().find(|m| m.name == name.as_str()) else {
-            let known: Vec<_> = declared.iter().map(|m| m.name).collect();
-            return Err(TwinError::UnknownMagnitude {
-                id,
-                name: name.into(),
-                known: known.join(", "),
-            });
+        let problem = match declared.iter().find(|m| m.name == name.as_str()) {
+            Some(magnitude) if magnitude.limits.contains(value) => continue,
+            Some(magnitude) => format!(
+                ": {name} = {} is outside {}; choose a value inside",
+                number(value),
+                magnitude.limits
+            ),
+            None => {
+                let known: Vec<_> = declared.iter().map(|m| m.name).collect();
+                let meant = did_you_mean(name, known.iter().copied());
+                let known = known.join(", ");
+                format!(" has no magnitude \"{name}\"{meant}; it has {known}")
+            }
         };
-        if !magnitude.limits.contains(value) {
-            return Err(TwinError::MagnitudeValue {
-                id,
-                name: name.into(),
-                value,
-                limits: magnitude.limits.to_string(),
-            });
-        }
+        return Err(refused(effect, name, &problem));
     }
     Ok(())
 }

@@ -41,7 +41,10 @@ impl FromStr for EffectKey {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         match text.split_once('@') {
             Some((id, target)) => Ok(Self::new(id, target)),
-            None => Err(TwinError::EffectKey { text: text.into() }),
+            None => Err(TwinError::effect(
+                "id",
+                format!("\"{text}\" is no effect at a target; write id@target"),
+            )),
         }
     }
 }

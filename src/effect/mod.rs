@@ -16,7 +16,6 @@
 mod augment;
 mod catalogue;
 mod check;
-mod file;
 mod key;
 mod kind;
 mod law;
@@ -24,7 +23,6 @@ mod library;
 mod magnitude;
 mod marks;
 mod placed;
-mod unit;
 
 pub use augment::augment;
 pub(crate) use augment::augment_late;
@@ -38,5 +36,4 @@ pub(crate) use library::{clamp, lag};
 pub use magnitude::{Magnitude, Shape};
 pub(crate) use marks::{Mark, clipped, on_levels, rounded, stops};
 pub use placed::Effect;
-pub(crate) use placed::EffectEntry;
-pub(crate) use unit::{channel, magnitude_unit};
+pub(crate) use placed::{EffectEntry, channel, magnitude_unit};

@@ -1,12 +1,13 @@
 //! An effect at one target of a twin.
 
 use super::key::EffectKey;
-use super::kind::EffectKind;
+use super::kind::{EffectKind, OtherState};
+use super::law::TargetKind;
 use super::magnitude::Magnitude;
+use crate::record::{Quantity, Signals};
 use crate::twin::{Law, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::sync::Arc;
 
 /// A kind of effect at one target, with the magnitudes that are given; the others are free, a part of θ.
@@ -19,7 +20,7 @@ use std::sync::Arc;
 /// assert_eq!(lag.given("tau"), Some(2.5));
 /// # Ok::<(), truetwin::twin::TwinError>(())
 /// ```
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct Effect {
     key: EffectKey,
     other: Option<String>,
@@ -47,25 +48,19 @@ impl Effect {
         kind: Arc<EffectKind>,
         entry: &EffectEntry,
     ) -> Result<Self, TwinError> {
-        let id = || kind.id().to_owned();
-        let key = kind.other_state().map(super::kind::OtherState::key);
-        for (other, state) in [("from", &entry.from), ("to", &entry.to)] {
-            match state {
-                Some(state) if key != Some(other) => {
-                    return Err(TwinError::OtherState {
-                        id: id(),
-                        key: other,
-                        state: state.clone(),
-                    });
+        let (id, own) = (kind.id(), kind.other_state().map(OtherState::key));
+        for (key, state) in [("from", &entry.from), ("to", &entry.to)] {
+            let (at, problem) = match state {
+                Some(state) if own != Some(key) => {
+                    (key, format!("has no {key}; remove {key} = \"{state}\""))
                 }
-                None if key == Some(other) => {
-                    return Err(TwinError::NoOtherState {
-                        id: id(),
-                        key: other,
-                    });
-                }
-                _ => {}
-            }
+                None if own == Some(key) => (
+                    "id",
+                    format!("acts between two states; add {key} = \"the other state\""),
+                ),
+                _ => continue,
+            };
+            return Err(TwinError::effect(at, format!("effect {id} {problem}")));
         }
         let other = entry.from.as_deref().or(entry.to.as_deref());
         Ok(Self {
@@ -147,7 +142,7 @@ impl Effect {
     /// Returns the table that a file holds of it.
     pub fn entry(&self) -> EffectEntry {
         let other = |key| {
-            let own = self.kind.other_state().map(super::kind::OtherState::key);
+            let own = self.kind.other_state().map(OtherState::key);
             self.other.clone().filter(|_| own == Some(key))
         };
         EffectEntry {
@@ -157,16 +152,6 @@ impl Effect {
             to: other("to"),
             magnitudes: self.given.clone(),
         }
-    }
-}
-
-impl fmt::Debug for Effect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Effect")
-            .field("key", &self.key)
-            .field("other", &self.other)
-            .field("given", &self.given)
-            .finish_non_exhaustive()
     }
 }
 
@@ -187,4 +172,45 @@ pub struct EffectEntry {
     /// Magnitudes held at a value; the others are free.
     #[serde(default)]
     pub magnitudes: BTreeMap<String, f64>,
+}
+
+/// Returns the unit of a magnitude in those of a twin: the words `signal`, `state` and `from` of the library stand for the unit of what is
+/// bent, and of the other state. Empty where it has none.
+pub(crate) fn magnitude_unit(
+    effect: &Effect,
+    unit: &str,
+    states: &[Quantity],
+    signals: &Signals,
+) -> String {
+    let of_state = |name: &str| {
+        let state = states.iter().find(|q| q.name == name);
+        state.map_or("", |q| q.unit.as_str())
+    };
+    let of = |channels| channel(channels, effect.target()).map_or("", |q: &Quantity| &q.unit);
+    let bent = match effect.law().target() {
+        TargetKind::Sensor => of(&signals.outputs),
+        TargetKind::Actuator => of(&signals.inputs),
+        TargetKind::State => of_state(effect.target()),
+        TargetKind::Parameter => "",
+    };
+    let other = effect.other().map_or("", of_state);
+    let inside = |word: &str, own: &str| match own {
+        "" | "-" | "1" => "1".to_owned(),
+        own if unit == word || own.chars().all(char::is_alphanumeric) => own.to_owned(),
+        own => format!("({own})"),
+    };
+    let text = (unit.replace("signal", &inside("signal", bent)))
+        .replace("state", &inside("state", bent))
+        .replace("from", &inside("from", other));
+    match text.replace("1·", "").replace("·1", "").as_str() {
+        "1" | "1/1" => String::new(),
+        text => text.replace("/(1/s)", "·s").replace("(s)", "s"),
+    }
+}
+
+/// Returns the channel of `sensor`, or of `sensor2`.
+pub(crate) fn channel<'a>(channels: &'a [Quantity], target: &str) -> Option<&'a Quantity> {
+    let number = target.trim_start_matches(|c: char| !c.is_ascii_digit());
+    let index = number.parse().unwrap_or(1_usize).saturating_sub(1);
+    channels.get(index)
 }

@@ -192,15 +192,10 @@ fn line_of_effect(
         return None;
     }
     let value = match error {
-        TwinError::EffectTarget { name, .. } if is("target", name) => table.get("target"),
-        TwinError::DuplicateEffect { .. } => table.get("target"),
-        TwinError::EffectTarget { .. }
-        | TwinError::EffectOnItself { .. }
-        | TwinError::OtherState { key: "from", .. } => table.get("from").or(table.get("to")),
-        TwinError::OtherState { .. } => table.get("to"),
-        TwinError::UnknownMagnitude { name, .. } | TwinError::MagnitudeValue { name, .. } => {
-            (table.get("magnitudes")).and_then(|magnitudes| magnitudes.get_ref().get(name))
-        }
+        TwinError::Effect { key, .. } => match key.as_str() {
+            key @ ("id" | "target" | "from" | "to") => table.get(key),
+            name => (table.get("magnitudes")).and_then(|all| all.get_ref().get(name)),
+        },
         _ => None,
     };
     Some(line(text, value.or(table.get("id"))?.span().start))

@@ -99,7 +99,7 @@ impl Study {
     /// The study's word on noise levels and starts, for likelihoods of measured records.
     pub(crate) fn beliefs(&self) -> Beliefs {
         let declared = (self.file.noise.iter()).filter_map(|(name, level)| match level {
-            NoiseLevel::Declared { known, factor, .. } => Some((name.clone(), *known, *factor)),
+            NoiseLevel::Declared(level) => Some((name.clone(), level.known, level.factor)),
             _ => None,
         });
         let starts = (self.file.start.iter())

@@ -137,7 +137,7 @@ impl Study {
                 .collect()
         };
         let plan = self.plan_of(&file.record)?;
-        let declares = |level: &NoiseLevel| matches!(level, NoiseLevel::Declared { .. });
+        let declares = |level: &NoiseLevel| matches!(level, NoiseLevel::Declared(_));
         let step = match &plan {
             Some(plan) => plan.step,
             None if !file.noise.values().any(declares) => 1.0,

@@ -15,49 +15,9 @@ pub enum TwinError {
         /// Upper end.
         high: f64,
     },
-    /// No parameter at all.
-    #[error("the twin has no parameter to estimate; declare or free at least one")]
-    NoParameter,
-    /// Two parameters, states, inputs or outputs of one name.
-    #[error("duplicate {kind} name {name}; rename one")]
-    Duplicate {
-        /// "parameter", "state", "input" or "output".
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A name that files and the command line cannot tell apart from others.
-    #[error("{kind} name \"{name}\" {problem}")]
-    Name {
-        /// "parameter", "state", "input" or "output".
-        kind: &'static str,
-        /// The name.
-        name: String,
-        /// Problem and remedy.
-        problem: &'static str,
-    },
-    /// A prior or bounds with ends exchanged, or not finite.
-    #[error("{kind} of {name} is {interval}; write finite [low, high] with low < high")]
-    Box {
-        /// Parameter.
-        name: String,
-        /// "prior" or "bounds".
-        kind: &'static str,
-        /// The ends given.
-        interval: String,
-    },
-    /// A prior that leaves the physical bounds.
-    #[error(
-        "prior {prior} of {name} leaves its bounds {bounds}; shrink the prior or widen the bounds"
-    )]
-    PriorOutside {
-        /// Parameter.
-        name: String,
-        /// The prior box.
-        prior: String,
-        /// The physical bounds.
-        bounds: String,
-    },
+    /// A name, a prior or bounds that cannot be: what is wrong, and the remedy.
+    #[error("{0}")]
+    Declaration(String),
     /// A point with too many or too few numbers.
     #[error("{given} values for {expected} parameters ({names}); give one value for each")]
     Length {
@@ -137,104 +97,24 @@ pub enum TwinError {
         /// The problem there.
         problem: String,
     },
-    /// An id that neither the library nor the study has.
-    #[error("unknown effect id \"{id}\"{}; choose one of {known}", did_you_mean(id, known.split(", ")))]
-    UnknownEffect {
-        /// The id.
-        id: String,
-        /// Known ids.
-        known: String,
+    /// An effect that the twin cannot have.
+    #[error("{problem}")]
+    Effect {
+        /// Key of the effect's table that is wrong: `id`, `target`, `from`, `to` or a magnitude.
+        key: String,
+        /// Problem and remedy.
+        problem: String,
     },
-    /// A text that is not `id@target`.
-    #[error("\"{text}\" is no effect at a target; write id@target")]
-    EffectKey {
-        /// The text.
-        text: String,
-    },
-    /// The other state of a law between two states is missing.
-    #[error("effect {id} acts between two states; add {key} = \"the other state\"")]
-    NoOtherState {
-        /// Effect.
-        id: String,
-        /// `from` or `to`.
-        key: &'static str,
-    },
-    /// Another state is given to an effect that has none, or under the wrong key.
-    #[error("effect {id} has no {key}; remove {key} = \"{state}\"")]
-    OtherState {
-        /// Effect.
-        id: String,
-        /// `from` or `to`.
-        key: &'static str,
-        /// The state.
-        state: String,
-    },
-    /// The target, or the other state, does not exist.
-    #[error("effect {id}: the twin has no {what} \"{name}\"{}; choose one of {known}", did_you_mean(name, known.split(", ")))]
-    EffectTarget {
-        /// Effect.
-        id: String,
-        /// Kind of target.
-        what: &'static str,
-        /// The name.
-        name: String,
-        /// Names of this kind.
-        known: String,
-    },
-    /// A dynamics effect on a black box.
-    #[error(
-        "effect {id} bends the equations, which a black-box twin does not show; only sensor and actuator effects can be added"
-    )]
-    EffectOnBlackBox {
-        /// Effect.
-        id: String,
-    },
-    /// A magnitude that the effect does not have.
-    #[error("effect {id} has no magnitude \"{name}\"{}; it has {known}", did_you_mean(name, known.split(", ")))]
-    UnknownMagnitude {
-        /// Effect.
-        id: String,
-        /// The name.
-        name: String,
-        /// Its magnitudes.
-        known: String,
-    },
-    /// The same effect on the same target twice.
-    #[error("effect {id} on {target} is given twice; give it once")]
-    DuplicateEffect {
-        /// Effect.
-        id: String,
-        /// Target.
-        target: String,
-    },
-    /// An effect between a state and itself.
-    #[error("effect {id} goes from {target} to itself; name another state")]
-    EffectOnItself {
-        /// Effect.
-        id: String,
-        /// Target.
-        target: String,
-    },
-    /// A memory after the noise, where the framework keeps none.
-    #[error("effect {id} remembers and stands after the noise; give it an order below {limit}")]
-    EffectMemory {
-        /// Effect.
-        id: String,
-        /// The order at which the noise enters.
-        limit: u32,
-    },
-    /// A magnitude out of its limits.
-    #[error("effect {id}: {name} = {} is outside {limits}; choose a value inside", number(*value))]
-    MagnitudeValue {
-        /// Effect.
-        id: String,
-        /// Magnitude.
-        name: String,
-        /// The value.
-        value: f64,
-        /// Its limits.
-        limits: String,
-    },
+}
+
+impl TwinError {
+    /// An error at a key of an effect's table.
+    pub(crate) fn effect(key: &str, problem: impl Into<String>) -> Self {
+        Self::Effect {
+            key: key.into(),
+            problem: problem.into(),
+        }
+    }
 }
 
 /// A simulation without outputs.

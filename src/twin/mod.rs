@@ -13,9 +13,7 @@ mod adapt;
 mod composed;
 pub mod conformance;
 mod definitions;
-mod direction;
 mod error;
-mod fix;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod handle;
@@ -23,22 +21,19 @@ mod integrator;
 mod interval;
 mod names;
 mod noise;
-mod outline;
 mod parameter;
 mod points;
 mod state_space;
 
-pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt, begun};
+pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt, begun, fix};
 pub(crate) use composed::{
     Acting, DeadTime, Disturbance, Entry, FittedLevels, KnownNoise, LARGEST, Law, LawPart,
-    LawPlace, LevelSource, NoiseLaw, NoisePart, OutlierLaw, ParameterChange, RateChange,
-    SensorNoise, SignalChange, StateLimit, TwinPart, WhiteLevel,
+    LawPlace, LevelSource, NoisePart, ParameterChange, RateChange, SensorNoise, SignalChange,
+    StateLimit, TwinPart, WhiteLevel,
 };
 pub use composed::{Composed, ComposedBlackBox, DigitalTwin};
 pub(crate) use definitions::rates;
-pub(crate) use direction::{combination, oriented};
 pub use error::{SimulationError, TwinError};
-pub(crate) use fix::fix;
 pub use handle::Twin;
 pub use integrator::{Hold, Integrator, Now, Stepping};
 pub(crate) use integrator::{MOST_SUBSTEPS, Workspace};
@@ -46,8 +41,7 @@ pub use interval::Interval;
 pub(crate) use names::{check_twin, is_memory};
 pub(crate) use noise::mix;
 pub use noise::{Noise, Source};
-pub use outline::Outline;
-pub(crate) use parameter::PRIOR_DEVIATION;
+pub(crate) use parameter::{PRIOR_DEVIATION, combination, oriented};
 pub use parameter::{Parameter, ParameterSpace, Role};
 pub(crate) use points::{LanePoints, Layout, Points};
-pub use state_space::{Outliers, StateSpace};
+pub use state_space::{Outliers, Outline, StateSpace};

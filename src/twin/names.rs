@@ -1,8 +1,8 @@
 //! Names that files, the command line and effects can tell apart.
 
+use super::parameter::check_unique;
 use crate::record::Quantity;
 use crate::twin::{Outline, Parameter, Role, Twin, TwinError};
-use std::collections::BTreeSet;
 
 /// Characters with a meaning in names that are put together: `start.h1`, `id@target.magnitude`, `disturbance/0`.
 const RESERVED: [char; 3] = ['/', '@', '.'];
@@ -17,8 +17,8 @@ pub(crate) fn check_twin(twin: &Twin) -> Result<(), TwinError> {
         Some(outline) => check_outline(&outline),
         None => {
             let signals = twin.signals();
-            unique("input", names(&signals.inputs))?;
-            unique("output", names(&signals.outputs))?;
+            check_unique("input", names(&signals.inputs))?;
+            check_unique("output", names(&signals.outputs))?;
             parameters.iter().try_for_each(check_composed)
         }
     }
@@ -33,7 +33,7 @@ fn check_outline(outline: &Outline) -> Result<(), TwinError> {
         ("input", &names(&outline.inputs).collect()),
         ("output", &names(&outline.outputs).collect()),
     ] {
-        unique(kind, all.iter().copied())?;
+        check_unique(kind, all.iter().copied())?;
         for name in all {
             let problem = if name.is_empty() {
                 "is empty; give it one"
@@ -75,20 +75,6 @@ fn is_channel(name: &str) -> bool {
     number.is_some_and(|digits| digits.chars().all(|c| c.is_ascii_digit()))
 }
 
-fn unique<'a>(
-    kind: &'static str,
-    names: impl IntoIterator<Item = &'a str>,
-) -> Result<(), TwinError> {
-    let mut seen = BTreeSet::new();
-    match names.into_iter().find(|name| !seen.insert(*name)) {
-        Some(name) => Err(TwinError::Duplicate {
-            kind,
-            name: name.into(),
-        }),
-        None => Ok(()),
-    }
-}
-
 /// Tells whether a state is the memory of an effect or a disturbance, not the twin's own: no state of a twin holds a slash.
 pub(crate) fn is_memory(state: &str) -> bool {
     state.contains('/')
@@ -98,12 +84,8 @@ fn names(quantities: &[Quantity]) -> impl Iterator<Item = &str> {
     quantities.iter().map(|quantity| quantity.name.as_str())
 }
 
-fn named(kind: &'static str, name: &str, problem: &'static str) -> TwinError {
-    TwinError::Name {
-        kind,
-        name: name.into(),
-        problem,
-    }
+fn named(kind: &str, name: &str, problem: &str) -> TwinError {
+    TwinError::Declaration(format!("{kind} name \"{name}\" {problem}"))
 }
 
 #[cfg(test)]

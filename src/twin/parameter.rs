@@ -1,5 +1,6 @@
 //! Parameters to estimate: names, units, prior box and physical bounds.
 
+use crate::setting::number;
 use crate::twin::{Interval, Noise, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -104,16 +105,40 @@ impl Parameter {
         self
     }
 
+    /// Checks that prior and bounds are finite and in order, and the prior inside the bounds.
+    fn check(&self) -> Result<(), TwinError> {
+        let Self {
+            name,
+            prior,
+            bounds,
+            ..
+        } = self;
+        for (kind, interval) in [("prior", prior), ("bounds", bounds)] {
+            if interval.check().is_err() || !interval.is_finite() {
+                return Err(TwinError::Declaration(format!(
+                    "{kind} of {name} is {interval}; write finite [low, high] with low < high"
+                )));
+            }
+        }
+        if !bounds.contains(prior.low()) || !bounds.contains(prior.high()) {
+            return Err(TwinError::Declaration(format!(
+                "prior {prior} of {name} leaves its bounds {bounds}; shrink the prior or widen the bounds"
+            )));
+        }
+        Ok(())
+    }
+
     /// Checks that a value lies within the bounds.
     pub(crate) fn check_value(&self, value: f64) -> Result<(), TwinError> {
         if self.bounds.contains(value) {
             return Ok(());
         }
-        Err(TwinError::OutOfBounds {
-            name: self.name.clone(),
-            value,
-            bounds: self.bounds.to_string(),
-        })
+        Err(TwinError::Declaration(format!(
+            "{} = {} is outside its bounds {}; choose a value inside",
+            self.name,
+            number(value),
+            self.bounds
+        )))
     }
 
     /// Returns the state of a start, the state or output of a noise level, and the whole name of any other parameter.
@@ -137,6 +162,20 @@ impl Parameter {
     }
 }
 
+/// Checks that no name of a `kind` is given twice.
+pub(super) fn check_unique<'a>(
+    kind: &str,
+    names: impl IntoIterator<Item = &'a str>,
+) -> Result<(), TwinError> {
+    let mut seen = BTreeSet::new();
+    match names.into_iter().find(|name| !seen.insert(*name)) {
+        Some(name) => Err(TwinError::Declaration(format!(
+            "duplicate {kind} name {name}; rename one"
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// The parameters of a twin, in the order of θ.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ParameterSpace(Vec<Parameter>);
@@ -150,35 +189,12 @@ impl ParameterSpace {
     /// Checks that names are unique, boxes in order, and priors inside bounds.
     pub fn check(&self) -> Result<(), TwinError> {
         if self.0.is_empty() {
-            return Err(TwinError::NoParameter);
+            return Err(TwinError::Declaration(
+                "the twin has no parameter to estimate; declare or free at least one".into(),
+            ));
         }
-        let mut seen = BTreeSet::new();
-        for parameter in &self.0 {
-            if !seen.insert(&parameter.name) {
-                return Err(TwinError::Duplicate {
-                    kind: "parameter",
-                    name: parameter.name.clone(),
-                });
-            }
-            for (kind, interval) in [("prior", parameter.prior), ("bounds", parameter.bounds)] {
-                if interval.check().is_err() || !interval.is_finite() {
-                    return Err(TwinError::Box {
-                        name: parameter.name.clone(),
-                        kind,
-                        interval: interval.to_string(),
-                    });
-                }
-            }
-            let (prior, bounds) = (parameter.prior, parameter.bounds);
-            if !bounds.contains(prior.low()) || !bounds.contains(prior.high()) {
-                return Err(TwinError::PriorOutside {
-                    name: parameter.name.clone(),
-                    prior: prior.to_string(),
-                    bounds: bounds.to_string(),
-                });
-            }
-        }
-        Ok(())
+        check_unique("parameter", self.names())?;
+        self.0.iter().try_for_each(Parameter::check)
     }
 
     /// Checks that `theta` has the right length and lies in the bounds.
@@ -298,6 +314,37 @@ impl std::ops::IndexMut<usize> for ParameterSpace {
     }
 }
 
+/// The direction with the sign under which its first leading part is positive: a direction has no sign of its own, and
+/// results must repeat. Parts within 1 % of the largest lead.
+pub fn oriented(direction: &[f64]) -> Vec<f64> {
+    let largest = direction.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+    let leading = direction.iter().find(|v| v.abs() >= 0.99 * largest);
+    let sign = leading.map_or(1.0, |v| v.signum());
+    direction.iter().map(|v| sign * v).collect()
+}
+
+/// A direction in words: `0.71·k1 − 0.71·k2`, parts under a twentieth of the largest left out.
+pub fn combination(names: &[&str], direction: &[f64]) -> String {
+    if let [name] = names {
+        return (*name).to_owned();
+    }
+    let direction = oriented(direction);
+    let largest = direction.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+    let mut text = String::new();
+    for (name, value) in names.iter().zip(&direction) {
+        if value.abs() > 0.05 * largest {
+            text.push_str(match (text.is_empty(), *value < 0.0) {
+                (true, true) => "−",
+                (true, false) => "",
+                (false, true) => " − ",
+                (false, false) => " + ",
+            });
+            text.push_str(&format!("{:.2}·{name}", value.abs()));
+        }
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -322,7 +369,8 @@ mod tests {
     #[test]
     fn a_prior_outside_the_bounds_is_named() {
         let space = ParameterSpace::new([Parameter::new("k", "-", 0.0, 2.0).within(0.5, 3.0)]);
-        assert!(matches!(space.check(), Err(TwinError::PriorOutside { .. })));
+        let error = space.check().unwrap_err().to_string();
+        assert!(error.contains("leaves its bounds [0.5, 3]"), "{error}");
     }
 
     #[test]
@@ -344,5 +392,16 @@ mod tests {
         // sd of the mean: (width/√12)/√n = 0.013
         assert!((mean - 2.0).abs() < 0.06, "{mean}");
         assert_eq!(space.draw_prior(Noise::new(1, "test", 0)), draws[0]);
+    }
+
+    #[test]
+    fn signs_and_small_parts() {
+        let names = ["a", "b", "c"];
+        assert_eq!(
+            combination(&names, &[-0.7, 0.7000001, 0.01]),
+            "0.70·a − 0.70·b"
+        );
+        assert_eq!(combination(&names, &[-0.3, 0.9, 0.0]), "−0.30·a + 0.90·b");
+        assert_eq!(combination(&["nu"], &[1.0]), "nu");
     }
 }

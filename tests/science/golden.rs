@@ -6,10 +6,14 @@
 
 #[path = "../common/golden.rs"]
 mod common;
+#[path = "../../examples/own_twin.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod own_twin;
 
 use crate::agreement::rooms::Rooms;
 use common::Asks::{Diagnosis, Fit, QuickDiagnosis};
 use common::{Asks, Case, with_tables, worse};
+use own_twin::Tank;
 use std::path::Path;
 use truetwin::effect::{Catalogue, augment};
 use truetwin::evaluate::paper::reference_studies;
@@ -111,30 +115,6 @@ fn pendulum() -> Study {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/pendulum.py");
     let twin = ProgramTwin::start("python3", [script], ProgramSettings::default());
     Study::of(twin.unwrap()).unwrap()
-}
-
-/// The leaking tank of `examples/own_twin.rs`.
-struct Tank;
-
-impl StateSpace for Tank {
-    fn outline(&self) -> Outline {
-        Outline::new()
-            .parameter(Parameter::new("k", "m²/s", 0.2, 1.0).within(0.01, 3.0))
-            .parameter(Parameter::new("area", "m²", 0.5, 1.5).within(0.2, 5.0))
-            .state("h", "m")
-            .input("u", "m³/s")
-            .output("y", "m")
-    }
-    fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
-        let (k, area) = (now.theta[0], now.theta[1]);
-        dx[0] = (now.u[0] - k * x[0]) / area;
-    }
-    fn observe(&self, _: &Now, x: &[f64], y: &mut [f64]) {
-        y[0] = x[0];
-    }
-    fn noise(&self, _: &Now, process: &mut [f64], measurement: &mut [f64]) {
-        (process[0], measurement[0]) = (0.01, 0.02);
-    }
 }
 
 /// Tanks with a ceiling.

@@ -2,8 +2,7 @@
 
 use super::check::{check_effects, targets};
 use super::law::NOISE_ENTERS;
-use super::placed::Effect;
-use super::unit::magnitude_unit;
+use super::placed::{Effect, magnitude_unit};
 use crate::record::{Quantity, Signals};
 use crate::twin::{
     Interval, Law, LawPart, Parameter, Role, SimulationError, Twin, TwinError, TwinPart,

@@ -12,6 +12,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
         EffectKind::actuator("actuator-gain", "u·(1 + error)", |m, _, _, u| {
             u * (1.0 + m[0])
         })
+        .with_sentence("{place} acts with its command changed by {%error}.")
         .magnitude(
             Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2])
                 .within(-1.0, f64::INFINITY)
@@ -20,6 +21,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
         .order(10),
         // A constant error of the zero.
         EffectKind::actuator("actuator-bias", "u + offset", |m, _, _, u| u + m[0])
+            .with_sentence("{place} acts with its command plus {offset}.")
             .magnitude(Magnitude::signed(
                 "offset",
                 "signal",
@@ -32,6 +34,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "u − clamp(u, ±width/2)",
             |m, _, _, u| u - clamp(u, -0.5 * m[0], 0.5 * m[0]),
         )
+        .with_sentence("{place} does not act within a dead zone of {width}.")
         .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]).shape(Shape::Level))
         .order(30),
         // Play: after a reversal nothing moves until it is used up; v starts at the first u.
@@ -43,6 +46,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 memory[0]
             },
         )
+        .with_sentence("{place} has a play of {width}.")
         .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]).shape(Shape::Level))
         .memory(1)
         .order(40),
@@ -52,6 +56,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "clamp(u, low, high)",
             |m, _, _, u| clamp(u, m[0], m[1]),
         )
+        .with_sentence("{place} does not act below {low} or above {high}.")
         .magnitude(LOW)
         .magnitude(HIGH)
         .order(50),
@@ -61,6 +66,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "v ← v + clamp(u − v, ±rate·Δt)",
             |m, now, memory, u| limit_rate(m[0] * now.dt, &mut memory[0], u),
         )
+        .with_sentence("{place} changes by {rate} at most.")
         .magnitude(
             Magnitude::positive("rate", "signal/s", &[0.1, 0.5, 2.0])
                 .shape(Shape::Rate)
@@ -74,6 +80,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "v ← a·v + (1 − a)·u, a = exp(−Δt/τ)",
             |m, now, memory, u| lag(m[0], now.dt, &mut memory[0], u),
         )
+        .with_sentence("{place} follows its command with a lag of {tau}.")
         .magnitude(TAU)
         .memory(1)
         .order(70),
@@ -83,6 +90,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "u(t − delay), linear between samples",
             |m, now, memory, u| delay(m[0], now.dt, memory, u),
         )
+        .with_sentence("{place} acts {delay} after its command.")
         .magnitude(DELAY)
         .memory(DELAY_SAMPLES)
         .dead_time()

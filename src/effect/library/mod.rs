@@ -3,7 +3,6 @@
 mod actuator;
 mod parameter;
 mod sensor;
-mod sentences;
 mod shared;
 mod state;
 
@@ -20,12 +19,6 @@ pub(super) fn rows() -> Vec<EffectKind> {
         parameter::rows(),
     ]
     .concat()
-    .into_iter()
-    .map(|kind| match sentences::sentence(kind.id()) {
-        Some(sentence) => kind.with_sentence(sentence),
-        None => kind,
-    })
-    .collect()
 }
 
 #[cfg(test)]
@@ -64,5 +57,23 @@ mod tests {
             })
             .collect();
         assert_eq!(table, written);
+    }
+
+    /// Every effect has a sentence, and every word in braces is a magnitude of it or a place.
+    #[test]
+    fn every_effect_has_its_sentence() {
+        for kind in rows() {
+            let sentence = kind.sentence().unwrap_or_else(|| panic!("{}", kind.id()));
+            for part in sentence.split('{').skip(1) {
+                let name = part.split('}').next().unwrap().trim_start_matches('%');
+                let known = kind.magnitudes().iter().any(|m| m.name == name);
+                let is_other = name == "other" && kind.other_state().is_some();
+                assert!(
+                    known || is_other || name == "place",
+                    "{}: {name}",
+                    kind.id()
+                );
+            }
+        }
     }
 }

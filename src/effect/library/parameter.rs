@@ -9,6 +9,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
         EffectKind::parameter("parameter-drift", "θ·(1 + rate·t)", |m, t, value| {
             value * (1.0 + m[0] * t)
         })
+        .with_sentence("{place} drifts by a share of {rate}.")
         .magnitude(
             Magnitude::signed("rate", "1/s", &[-0.01, -0.001, 0.001, 0.01]).shape(Shape::Rate),
         ),
@@ -24,6 +25,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 }
             },
         )
+        .with_sentence("{place} changes by {%size} at {time}.")
         .magnitude(
             Magnitude::signed("size", "1", &[-0.3, -0.1, 0.1, 0.3])
                 .within(-1.0, f64::INFINITY)

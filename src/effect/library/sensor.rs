@@ -10,6 +10,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
     vec![
         // A constant error of the zero.
         EffectKind::sensor("sensor-bias", "s + offset", |m, _, _, s| s + m[0])
+            .with_sentence("{place} shows the true value plus {offset}.")
             .magnitude(Magnitude::signed(
                 "offset",
                 "signal",
@@ -20,6 +21,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
         EffectKind::sensor("sensor-gain", "s·(1 + error)", |m, _, _, s| {
             s * (1.0 + m[0])
         })
+        .with_sentence("{place} shows the true value changed by {%error}.")
         .magnitude(
             Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2])
                 .within(-1.0, f64::INFINITY)
@@ -30,6 +32,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
         EffectKind::sensor("sensor-drift", "s + rate·t", |m, now, _, s| {
             s + m[0] * now.t
         })
+        .with_sentence("{place} drifts by {rate}.")
         .magnitude(
             Magnitude::signed("rate", "signal/s", &[-0.01, -0.001, 0.001, 0.01]).shape(Shape::Rate),
         )
@@ -40,6 +43,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "z ← a·z + (1 − a)·s, a = exp(−Δt/τ)",
             |m, now, memory, s| lag(m[0], now.dt, &mut memory[0], s),
         )
+        .with_sentence("{place} follows the true value with a lag of {tau}.")
         .magnitude(TAU)
         .memory(1)
         .order(40),
@@ -49,6 +53,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "s(t − delay), linear between samples",
             |m, now, memory, s| delay(m[0], now.dt, memory, s),
         )
+        .with_sentence("{place} shows the true value {delay} late.")
         .magnitude(DELAY)
         .memory(DELAY_SAMPLES)
         .dead_time()
@@ -60,6 +65,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "(1 − f)·s + f·abs(s)",
             |m, _, _, s| (1.0 - m[0]) * s + m[0] * s.abs(),
         )
+        .with_sentence("{place} shows {%fraction} of the size of the signal, whatever its sign.")
         .magnitude(
             Magnitude::positive("fraction", "1", &[0.1, 0.5, 0.9])
                 .within(0.0, 1.0)
@@ -72,17 +78,20 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "r² + std² for the variance r² of the twin's own noise",
             |m| m[0],
         )
+        .with_sentence("{place} has noise of {std} beside its own.")
         .magnitude(Magnitude::positive("std", "signal", &[0.01, 0.05, 0.2])),
         // A limited range, after the noise. Where low exceeds high, high wins.
         EffectKind::sensor("sensor-saturation", "clamp(s, low, high)", |m, _, _, s| {
             clamp(s, m[0], m[1])
         })
+        .with_sentence("{place} shows nothing below {low} or above {high}.")
         .magnitude(LOW)
         .magnitude(HIGH)
         .mark(clipped)
         .order(80),
         // Rounding to a multiple of the step, halves upwards.
         EffectKind::rounding("sensor-quantization", "step·⌊s/step + ½⌋", |m| m[0])
+            .with_sentence("{place} shows steps of {step}.")
             .magnitude(Magnitude::positive("step", "signal", &[0.02, 0.1, 0.5]).shape(Shape::Level))
             .mark(rounded),
         // Rare large errors, after everything else.
@@ -94,6 +103,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 scale: m[1],
             },
         )
+        .with_sentence("{place} is off by about {scale} in {%probability} of the samples.")
         .magnitude(
             Magnitude::positive("probability", "1", &[0.01, 0.05])
                 .within(0.0, 1.0)

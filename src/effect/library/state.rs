@@ -21,6 +21,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 }
             },
         )
+        .with_sentence("{place} stops rising at {level}; {%spill} of what spills reaches {other}.")
         .magnitude(Magnitude::signed("level", "state", &[0.5, 1.0, 2.0, 4.0]).off(f64::INFINITY))
         .magnitude(
             Magnitude::positive("spill", "1", &[0.0, 0.5, 1.0])
@@ -35,6 +36,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "q² + std² for the variance q² of the twin's own increment a step",
             |m| m[0],
         )
+        .with_sentence("{place} is moved by noise of {std} a step.")
         .magnitude(Magnitude::positive("std", "state", &[0.01, 0.05, 0.2])),
     ]);
     rows
@@ -43,21 +45,28 @@ pub(super) fn rows() -> Vec<EffectKind> {
 fn forces() -> Vec<EffectKind> {
     vec![
         // A constant push or leak.
-        EffectKind::force("constant-forcing", "ẋ + force", |m, _| m[0]).magnitude(
-            Magnitude::signed("force", "state/s", &[-0.3, -0.1, 0.1, 0.3]),
-        ),
+        EffectKind::force("constant-forcing", "ẋ + force", |m, _| m[0])
+            .with_sentence("A constant {force} acts on {place}.")
+            .magnitude(Magnitude::signed(
+                "force",
+                "state/s",
+                &[-0.3, -0.1, 0.1, 0.3],
+            )),
         // A loss of constant size against the sign of the state, with sign 0 = 0.
         EffectKind::force("coulomb-friction", "ẋ − force·sign x", |m, at| {
             -m[0] * sign(at.x)
         })
+        .with_sentence("Dry friction of {force} acts against {place}.")
         .magnitude(Magnitude::positive("force", "state/s", &[0.03, 0.1, 0.3])),
         // Leakage, cooling, viscous friction.
         EffectKind::force("linear-loss", "ẋ − rate·x", |m, at| -m[0] * at.x)
+            .with_sentence("{place} is lost at a further rate of {rate}.")
             .magnitude(Magnitude::positive("rate", "1/s", &[0.03, 0.1, 0.3])),
         // Another state acts on this one.
         EffectKind::force("cross-coupling", "ẋ + rate·x_from", |m, at| {
             m[0] * at.other
         })
+        .with_sentence("{other} acts on {place} with a factor of {rate}.")
         .magnitude(Magnitude::signed(
             "rate",
             "state/(from·s)",
@@ -68,6 +77,7 @@ fn forces() -> Vec<EffectKind> {
         EffectKind::force("quadratic-drag", "ẋ − c·abs(x)·x", |m, at| {
             -m[0] * at.x.abs() * at.x
         })
+        .with_sentence("A drag that grows with the square of {place} acts on it: {coefficient}.")
         .magnitude(Magnitude::positive(
             "coefficient",
             "1/(state·s)",
@@ -77,6 +87,9 @@ fn forces() -> Vec<EffectKind> {
         EffectKind::force("cubic-stiffness", "ẋ − c·x_from³", |m, at| {
             -m[0] * at.other.powi(3)
         })
+        .with_sentence(
+            "A force that grows with the cube of {other} acts on {place}: {coefficient}.",
+        )
         .magnitude(Magnitude::signed(
             "coefficient",
             "state/(from³·s)",
@@ -87,6 +100,7 @@ fn forces() -> Vec<EffectKind> {
         EffectKind::force("power-law", "ẋ − c·abs(x)^e·sign x", |m, at| {
             -m[0] * at.x.abs().powf(m[1]) * sign(at.x)
         })
+        .with_sentence("A loss of {coefficient} times {place} to the power {exponent} acts on it.")
         .magnitude(Magnitude::signed(
             "coefficient",
             "state^(1−e)/s",
@@ -104,6 +118,7 @@ fn forces() -> Vec<EffectKind> {
             "ẋ + amplitude·sin(2π·f·t + phase)",
             |m, at| m[0] * (TAU * m[1] * at.t + m[2]).sin(),
         )
+        .with_sentence("An oscillation of {frequency} and {amplitude} acts on {place}.")
         .magnitude(Magnitude::positive("amplitude", "state/s", &[0.1, 0.3]))
         .magnitude(
             // A period of eleven days stands for "above 0".

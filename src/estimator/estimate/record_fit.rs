@@ -6,9 +6,9 @@ use crate::estimator::error::EstimatorError;
 use crate::fit::{Fit, FitSettings, FittedNoise};
 use crate::likelihood::{likelihood_of, with_levels};
 use crate::progress::Progress;
-use crate::record::{Drive, Record, Signal, Signals};
+use crate::record::Record;
 use crate::study::{Study, StudyError};
-use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError, Twin};
+use crate::twin::{Noise, Twin};
 use std::collections::BTreeMap;
 
 /// Fit of a record, and the twin in the noise that it shows.
@@ -22,29 +22,6 @@ pub(super) struct RecordFit {
     /// The twin for the tests, with levels drawn from the fit. In the declared ones a right record is rejected as soon as its own differ by
     /// more than the test can see: 26 of 100 where they do by up to a third.
     pub drawn: Twin,
-}
-
-/// A twin whose noise levels are as unsure as the fit leaves them: every run has levels of its own.
-struct DrawnLevels(Vec<Twin>);
-
-impl DigitalTwin for DrawnLevels {
-    fn parameters(&self) -> ParameterSpace {
-        self.0[0].parameters()
-    }
-
-    fn signals(&self) -> Signals {
-        self.0[0].signals()
-    }
-
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        let chosen = noise.source("levels").uniform() * self.0.len() as f64;
-        self.0[chosen as usize].simulate(theta, drive, noise)
-    }
 }
 
 impl RecordFit {
@@ -70,9 +47,10 @@ impl RecordFit {
             // The estimate stands on features, which may exist where the likelihood does not.
             Err(_) => return Ok(None),
         };
-        let in_levels = |levels: BTreeMap<String, f64>| match levels.is_empty() {
+        let in_levels = |draws: &[BTreeMap<String, f64>]| match draws.iter().all(BTreeMap::is_empty)
+        {
             true => Ok(study.twin().clone()),
-            false => with_levels(study.twin(), record, &study.beliefs(), &levels)
+            false => with_levels(study.twin(), record, &study.beliefs(), draws)
                 .map_err(|error| EstimatorError::from(StudyError::Adaptation(error))),
         };
         let levels: Vec<FittedNoise> = fit.noise.iter().filter(|l| is_off(l)).cloned().collect();
@@ -80,22 +58,18 @@ impl RecordFit {
         // A fitted level where none is declared may be no more than a floor, and hides what an exact twin would show.
         let is_declared = |level: &&FittedNoise| level.declared.is_some() && level.value > 0.0;
         let declared: Vec<&FittedNoise> = fit.noise.iter().filter(is_declared).collect();
-        let draws = if declared.is_empty() {
-            1
-        } else {
-            BUDGET.level_draws
-        };
-        let drawn = (0..draws).map(|draw| {
+        let drawn = (0..BUDGET.level_draws).map(|draw| {
             let mut source = Noise::new(options.seed, "levels", draw).source("normal");
             let levels = declared.iter().map(|level| {
                 let factor = (source.normal() * level.std_error / level.value).exp();
                 (level.name.clone(), level.value * factor)
             });
-            in_levels(levels.collect())
+            levels.collect()
         });
+        let drawn: Vec<_> = drawn.collect();
         Ok(Some(Self {
-            twin: in_levels(off.collect())?,
-            drawn: Twin::new(DrawnLevels(drawn.collect::<Result<_, _>>()?)),
+            twin: in_levels(&[off.collect()])?,
+            drawn: in_levels(&drawn)?,
             levels,
             fit,
         }))

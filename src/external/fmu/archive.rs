@@ -1,8 +1,8 @@
 //! The archive that an FMU is.
 
 use super::description::{ModelDescription, Version};
-use super::error;
 use super::unpack::{MOST_BYTES, unpack};
+use crate::storage::files::with_remedy;
 use crate::storage::untrusted::read;
 use crate::study::StudyError;
 use fmi::fmi2::import::Fmi2Import;
@@ -23,8 +23,8 @@ pub(super) enum Archive {
 
 /// Unpacks an FMU into a temporary folder and reads its description.
 pub(super) fn open(path: &Path) -> Result<(ModelDescription, TempDir), StudyError> {
-    let at = |problem: String| error::archive(path, &problem);
-    let file = File::open(path).map_err(|error| error::io(path, &error))?;
+    let at = |problem: String| refused(path, format!("no usable FMU: {problem}; export it again"));
+    let file = File::open(path).map_err(|error| refused(path, with_remedy(&error)))?;
     let folder = tempfile::Builder::new().prefix("truetwin-fmu-").tempdir();
     let folder = folder.map_err(|error| at(format!("no temporary folder: {error}")))?;
     unpack(file, folder.path(), MOST_BYTES).map_err(at)?;
@@ -118,4 +118,9 @@ impl Archive {
 
 fn escaped(text: &str) -> String {
     (text.replace('&', "&amp;").replace('<', "&lt;")).replace('"', "&quot;")
+}
+
+/// Creates the error of a file; the problem says what is wrong and what to do.
+pub(super) fn refused(path: &Path, problem: impl std::fmt::Display) -> StudyError {
+    StudyError::Simulator(format!("{}: {problem}", path.display()))
 }

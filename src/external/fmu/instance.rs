@@ -1,27 +1,10 @@
 //! One instance of an FMU, of either version of the standard.
 
 use super::archive::Archive;
+use crate::twin::SimulationError;
 use fmi::fmi2::instance::{CoSimulation as Two, Common as TwoCommon, InstanceCS as InstanceTwo};
 use fmi::fmi3::{CoSimulation as Three, Fmi3Model, GetSet, instance::InstanceCS as InstanceThree};
 use fmi::traits::FmiInstance;
-
-/// Why an FMU did not do something.
-#[derive(Debug)]
-pub(super) enum Refusal {
-    /// It discarded or failed this one call.
-    Error(String),
-    /// It says that nothing will work any more, or leads astray.
-    Fatal(String),
-}
-
-/// Result of a step.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum Step {
-    /// The end of the step.
-    Done,
-    /// The FMU asks to end the simulation.
-    Ended,
-}
 
 /// An instance for co-simulation.
 pub(super) enum Instance {
@@ -29,17 +12,18 @@ pub(super) enum Instance {
     Three(Box<InstanceThree>),
 }
 
-/// An outcome of the library as ours; `what` is for the message.
-fn done<T>(outcome: Result<T, impl Into<fmi::Error>>, what: &str) -> Result<(), Refusal> {
+/// An outcome of the library as a simulation's; `what` is for the message.
+fn done<T>(outcome: Result<T, impl Into<fmi::Error>>, what: &str) -> Result<(), SimulationError> {
     let error = match outcome {
         Ok(_) => return Ok(()),
         Err(error) => error.into(),
     };
-    let text = format!("{what}: {error}");
     Err(match error {
         fmi::Error::Fmi2Error(fmi::fmi2::Fmi2Error::Fatal)
-        | fmi::Error::Fmi3Error(fmi::fmi3::Fmi3Error::Fatal) => Refusal::Fatal(text),
-        _ => Refusal::Error(text),
+        | fmi::Error::Fmi3Error(fmi::fmi3::Fmi3Error::Fatal) => {
+            SimulationError::fatal(format!("the FMU is corrupt: {what}: {error}"))
+        }
+        _ => SimulationError::Failed(format!("the FMU refuses {what}: {error}").into()),
     })
 }
 
@@ -59,7 +43,7 @@ impl Instance {
     }
 
     /// As newly made.
-    pub fn reset(&mut self) -> Result<(), Refusal> {
+    pub fn reset(&mut self) -> Result<(), SimulationError> {
         match self {
             Self::Two(it) => done(FmiInstance::reset(it.as_mut()), "reset"),
             Self::Three(it) => done(FmiInstance::reset(it.as_mut()), "reset"),
@@ -67,7 +51,12 @@ impl Instance {
     }
 
     /// Sets reals by their references.
-    pub fn set(&mut self, references: &[u32], values: &[f64], what: &str) -> Result<(), Refusal> {
+    pub fn set(
+        &mut self,
+        references: &[u32],
+        values: &[f64],
+        what: &str,
+    ) -> Result<(), SimulationError> {
         match self {
             _ if references.is_empty() => Ok(()),
             Self::Two(it) => done(it.set_real(references, values), what),
@@ -76,7 +65,7 @@ impl Instance {
     }
 
     /// Reads reals by their references.
-    pub fn get(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
+    pub fn get(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), SimulationError> {
         match self {
             Self::Two(it) => done(it.get_real(references, values), "reading outputs"),
             Self::Three(it) => done(it.get_float64(references, values), "reading outputs"),
@@ -84,7 +73,7 @@ impl Instance {
     }
 
     /// Begins the initialisation at `start` seconds.
-    pub fn enter(&mut self, start: f64) -> Result<(), Refusal> {
+    pub fn enter(&mut self, start: f64) -> Result<(), SimulationError> {
         let what = "entering the initialisation";
         match self {
             Self::Two(it) => {
@@ -105,7 +94,7 @@ impl Instance {
     }
 
     /// Ends the initialisation.
-    pub fn exit(&mut self) -> Result<(), Refusal> {
+    pub fn exit(&mut self) -> Result<(), SimulationError> {
         let what = "the initialisation";
         match self {
             Self::Two(it) => done(FmiInstance::exit_initialization_mode(it.as_mut()), what),
@@ -113,8 +102,8 @@ impl Instance {
         }
     }
 
-    /// From `time` on for `step` seconds.
-    pub fn step(&mut self, time: f64, step: f64) -> Result<Step, Refusal> {
+    /// From `time` on for `step` seconds; `false` if the FMU asks to end the simulation.
+    pub fn step(&mut self, time: f64, step: f64) -> Result<bool, SimulationError> {
         let what = "a step";
         let (mut event, mut ended, mut early, mut reached) = (false, false, false, time);
         let told = (&mut event, &mut ended, &mut early, &mut reached);
@@ -125,6 +114,6 @@ impl Instance {
                 done(outcome, what)?;
             }
         }
-        Ok(if ended { Step::Ended } else { Step::Done })
+        Ok(!ended)
     }
 }

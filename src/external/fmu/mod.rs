@@ -4,7 +4,6 @@
 
 mod archive;
 mod description;
-mod error;
 pub(crate) mod fuzzing;
 mod instance;
 mod unpack;
@@ -16,7 +15,7 @@ use super::name;
 use crate::record::{Drive, Signal, Signals};
 use crate::study::{RecordPlan, Study, StudyError};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
-use archive::Archive;
+use archive::{Archive, refused};
 use description::Variable;
 use instance::Instance;
 use std::path::{Path, PathBuf};
@@ -76,7 +75,7 @@ impl FmuTwin {
     /// A file that is no FMU for co-simulation, or not for this platform; variables that it does not have.
     pub fn open(path: &Path, settings: FmuSettings) -> Result<Self, StudyError> {
         let (mut description, folder) = archive::open(path)?;
-        let variables = |problem: String| error::at(path, problem);
+        let variables = |problem: String| refused(path, problem);
         description.select(&settings.variables).map_err(variables)?;
         for list in [
             &mut description.parameters,
@@ -93,7 +92,11 @@ impl FmuTwin {
         if description.outputs.is_empty() {
             return Err(variables("no real output; export it with one".into()));
         }
-        let failed = |problem: String| error::instance(path, &problem);
+        let failed = |problem: String| {
+            let remedy = "export it with a binary for this platform, for co-simulation";
+            let problem = format!("the FMU cannot be instantiated: {problem}; {remedy}");
+            refused(path, problem)
+        };
         let archive = Archive::new(&description, folder).map_err(|e| failed(e.to_string()))?;
         let lacks = archive.lacks(&description.identifier);
         if let Some(function) = lacks.map_err(|e| failed(e.to_string()))? {
@@ -142,7 +145,7 @@ impl FmuTwin {
     /// As [`Study::new`]: no parameter, or boxes without room.
     pub fn into_study(self) -> Result<Study, StudyError> {
         let (path, name, plan) = (self.path.clone(), self.name.clone(), self.plan.clone());
-        Study::new(&name, self, plan).map_err(|error| error::at(&path, error))
+        Study::new(&name, self, plan).map_err(|error| refused(&path, error))
     }
 }
 

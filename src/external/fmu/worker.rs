@@ -1,7 +1,7 @@
 //! A thread that owns one instance: FMUs may be called from one thread only.
 
 use super::archive::Archive;
-use super::instance::{Instance, Refusal, Step};
+use super::instance::Instance;
 use crate::record::{Drive, Signal};
 use crate::twin::SimulationError;
 use std::sync::Arc;
@@ -101,35 +101,14 @@ impl Bench {
                 SimulationError::fatal(format!("no instance of the FMU: {error}"))
             })?,
         };
-        match run(&mut instance, &self.references, self.start, theta, drive) {
-            Ok(outputs) => {
-                self.instance = Some(instance);
-                Ok(outputs)
-            }
-            Err(Ending::Diverged(at)) => Err(SimulationError::Diverged { at }),
-            Err(Ending::Refused(Refusal::Error(text))) => Err(SimulationError::Failed(
-                format!("the FMU refuses {text}").into(),
-            )),
-            Err(Ending::Refused(Refusal::Fatal(text))) => {
-                // The standard forbids any further call, that to free it included.
-                std::mem::forget(instance);
-                Err(SimulationError::fatal(format!(
-                    "the FMU is corrupt: {text}"
-                )))
-            }
+        let outcome = run(&mut instance, &self.references, self.start, theta, drive);
+        match &outcome {
+            Ok(_) => self.instance = Some(instance),
+            // The standard forbids any further call, that to free it included.
+            Err(SimulationError::Fatal(_)) => std::mem::forget(instance),
+            Err(_) => {}
         }
-    }
-}
-
-/// Why a run has no outputs.
-enum Ending {
-    Diverged(f64),
-    Refused(Refusal),
-}
-
-impl From<Refusal> for Ending {
-    fn from(refusal: Refusal) -> Self {
-        Self::Refused(refusal)
+        outcome
     }
 }
 
@@ -140,7 +119,7 @@ fn run(
     start: f64,
     theta: &[f64],
     drive: &Drive,
-) -> Result<Signal, Ending> {
+) -> Result<Signal, SimulationError> {
     let References {
         parameters,
         inputs,
@@ -156,14 +135,14 @@ fn run(
         if k > 0 {
             let before = drive.time(k - 1);
             match instance.step(start + before, drive.dt()) {
-                Ok(Step::Done) => {}
-                Ok(Step::Ended) | Err(Refusal::Error(_)) => return Err(Ending::Diverged(before)),
-                Err(fatal) => return Err(fatal.into()),
+                Ok(true) => {}
+                Err(error) if !error.costs_one_run() => return Err(error),
+                Ok(false) | Err(_) => return Err(SimulationError::Diverged { at: before }),
             }
         }
         instance.get(outputs, &mut row)?;
         if row.iter().any(|value| !value.is_finite()) {
-            return Err(Ending::Diverged(drive.time(k)));
+            return Err(SimulationError::Diverged { at: drive.time(k) });
         }
         signal.row_mut(k).assign(&ndarray::ArrayView1::from(&row));
         if k > 0 {

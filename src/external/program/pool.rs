@@ -1,10 +1,9 @@
 //! Copies of a program, lent to one thread at a time.
 
 use super::super::lending::Lending;
-use super::command::ProgramCommand;
 use super::description::Description;
 use super::protocol::{self, LONGEST_DESCRIPTION};
-use super::worker::{Trouble, Worker};
+use super::worker::{ProgramCommand, Trouble, Worker};
 use crate::storage::untrusted::excerpt;
 use std::time::{Duration, Instant};
 

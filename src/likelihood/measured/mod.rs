@@ -20,7 +20,7 @@ pub(crate) use level::{Beliefs, Level, Measured};
 use super::ensemble;
 use super::kalman::FilterError;
 use crate::record::Record;
-use crate::twin::{Composed, ParameterSpace, Role, Twin, TwinError, fix};
+use crate::twin::{Composed, ParameterSpace, Role, Twin, TwinError, TwinPart, fix};
 use level::build;
 use motion::{followed_motion, free_motion, size};
 use std::collections::BTreeMap;
@@ -44,13 +44,13 @@ pub(crate) fn measured(
     }
 }
 
-/// The twin with these noise levels in place of its own; all else stays, its start too. Levels by state, per √s, or by output. A black
-/// box stays as it is.
+/// The twin with these noise levels in place of its own; all else stays, its start too. Levels by state, per √s, or by output; each run draws
+/// one of several lists. A black box stays as it is.
 pub(crate) fn with_levels(
     twin: &Twin,
     record: &Record,
     beliefs: &Beliefs,
-    levels: &BTreeMap<String, f64>,
+    draws: &[BTreeMap<String, f64>],
 ) -> Result<Twin, TwinError> {
     let Twin::Equations(base) = twin else {
         return Ok(twin.clone());
@@ -71,12 +71,19 @@ pub(crate) fn with_levels(
         &vec![1.0; states],
         &vec![1.0; outputs],
     );
-    let held = (measured.levels.iter()).map(|level| {
-        let own = level.declared.unwrap_or(0.0);
-        let value = levels.get(level.parameter.target()).copied();
-        (level.parameter.name.clone(), value.unwrap_or(own))
-    });
-    fix(measured.twin, &held.collect())
+    let values = |levels: &BTreeMap<String, f64>| -> Vec<f64> {
+        let value = |level: &Level| {
+            let own = level.declared.unwrap_or(0.0);
+            levels.get(level.parameter.target()).copied().unwrap_or(own)
+        };
+        measured.levels.iter().map(value).collect()
+    };
+    let values: Vec<Vec<f64>> = draws.iter().map(values).collect();
+    let names = measured.levels.iter().map(|level| &level.parameter.name);
+    let held = names.cloned().zip(values[0].iter().copied()).collect();
+    let fixed = fix(measured.twin, &held)?;
+    let first = twin.entries();
+    Ok(fixed.with([], vec![TwinPart::Drawn { first, values }]))
 }
 
 /// The prior's centre, sizes, lags and delays of effects at zero: what the twin's own motion tells must not hang on a guess of these, and the

@@ -119,7 +119,7 @@ fn levels_are_put_in_the_place_of_the_twins_own() {
     let (twin, record) = tanks();
     let levels = BTreeMap::from([("h2".to_owned(), 0.3), ("y".to_owned(), 0.05)]);
     let base = Twin::Equations(twin);
-    let loud = with_levels(&base, &record, &beliefs(0.5), &levels).unwrap();
+    let loud = with_levels(&base, &record, &beliefs(0.5), &[levels]).unwrap();
     assert_eq!(loud.parameters().names(), base.parameters().names());
     let theta = loud.parameters().centre();
     let equations = loud.equations().unwrap();

@@ -3,27 +3,41 @@
 use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
 
-/// Default of [`NoiseLevel::Declared`]'s `factor`: one standard deviation of a declared level is a factor e. A level that is off by
-/// a factor of three costs 0.6 nats, less than a record of 50 samples knows about it.
-const FACTOR: f64 = std::f64::consts::E;
-
 /// A noise level: `0.1`, `{ std = 0.1, known = true }`, or `"estimate"`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "NoiseText", into = "NoiseText")]
 pub(crate) enum NoiseLevel {
     /// Declared: simulations use it. A likelihood of a measured record fits it, unless it is known.
-    Declared {
-        /// Standard deviation; 0 declares nothing.
-        std: f64,
-        /// `true` if nothing is to be fitted.
-        known: bool,
-        /// Factor that one standard deviation of the fitted level's logarithm is, above 1.
-        factor: f64,
-        /// Unit of a state's level.
-        per: Per,
-    },
+    Declared(DeclaredNoise),
     /// Unknown: it becomes a parameter, which an estimator learns.
     Estimate,
+}
+
+/// A declared noise level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DeclaredNoise {
+    /// Standard deviation; 0 declares nothing.
+    pub std: f64,
+    /// `true` if nothing is to be fitted.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub known: bool,
+    /// Factor that one standard deviation of the fitted level's logarithm is, above 1.
+    #[serde(default = "usual_factor", skip_serializing_if = "is_usual_factor")]
+    pub factor: f64,
+    /// Unit of a state's level.
+    #[serde(default)]
+    pub per: Per,
+}
+
+/// Default of a declared level's factor: one standard deviation is a factor e. A level that is off by a factor of three costs 0.6 nats, less
+/// than a record of 50 samples knows about it.
+fn usual_factor() -> f64 {
+    std::f64::consts::E
+}
+
+fn is_usual_factor(factor: &f64) -> bool {
+    *factor == usual_factor()
 }
 
 /// Time in which a state's noise adds up to its level.
@@ -40,17 +54,17 @@ pub(crate) enum Per {
 impl NoiseLevel {
     /// A declared level, a state's per step.
     pub(crate) fn declared(std: f64) -> Self {
-        Self::Declared {
+        Self::Declared(DeclaredNoise {
             std,
             known: false,
-            factor: FACTOR,
+            factor: usual_factor(),
             per: Per::Step,
-        }
+        })
     }
 
     /// Checks numbers of the level of `name`.
     pub(super) fn check(self, name: &str) -> Result<(), TwinError> {
-        let Self::Declared { std, factor, .. } = self else {
+        let Self::Declared(DeclaredNoise { std, factor, .. }) = self else {
             return Ok(());
         };
         let wrong = |value, remedy| TwinError::Value {
@@ -77,20 +91,8 @@ impl NoiseLevel {
 )]
 enum NoiseText {
     Number(f64),
-    Table(NoiseTable),
+    Table(DeclaredNoise),
     Word(Word),
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NoiseTable {
-    std: f64,
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    known: bool,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    factor: Option<f64>,
-    #[serde(default)]
-    per: Per,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -103,12 +105,7 @@ impl From<NoiseText> for NoiseLevel {
     fn from(text: NoiseText) -> Self {
         match text {
             NoiseText::Number(std) => Self::declared(std),
-            NoiseText::Table(table) => Self::Declared {
-                std: table.std,
-                known: table.known,
-                factor: table.factor.unwrap_or(FACTOR),
-                per: table.per,
-            },
+            NoiseText::Table(table) => Self::Declared(table),
             NoiseText::Word(Word::Estimate) => Self::Estimate,
         }
     }
@@ -117,20 +114,10 @@ impl From<NoiseText> for NoiseLevel {
 impl From<NoiseLevel> for NoiseText {
     fn from(level: NoiseLevel) -> Self {
         match level {
-            NoiseLevel::Declared { std, .. } if level == NoiseLevel::declared(std) => {
-                Self::Number(std)
+            NoiseLevel::Declared(table) if level == NoiseLevel::declared(table.std) => {
+                Self::Number(table.std)
             }
-            NoiseLevel::Declared {
-                std,
-                known,
-                factor,
-                per,
-            } => Self::Table(NoiseTable {
-                std,
-                known,
-                factor: (factor != FACTOR).then_some(factor),
-                per,
-            }),
+            NoiseLevel::Declared(table) => Self::Table(table),
             NoiseLevel::Estimate => Self::Word(Word::Estimate),
         }
     }
@@ -237,12 +224,12 @@ mod tests {
 
     #[test]
     fn numbers_that_cannot_be_used_are_named() {
-        let factor = NoiseLevel::Declared {
+        let factor = NoiseLevel::Declared(DeclaredNoise {
             std: 0.1,
             known: false,
             factor: 0.5,
             per: Per::Step,
-        };
+        });
         for (level, value) in [(NoiseLevel::declared(-0.1), "-0.1"), (factor, "0.5")] {
             let error = level.check("h1").unwrap_err().to_string();
             assert!(error.contains(value), "{error}");

@@ -6,37 +6,32 @@
 //! | parts sorted by when they act; the inside of a delay | `parts.rs` |
 //! | motion: rates, memories, limits, points of a step | `motion.rs` |
 //! | outputs, starts and inputs | `signals.rs` |
-//! | noise levels | `noise.rs`, `levels.rs` |
-//! | inputs that act; the loop of a run | `acting.rs`, `simulation.rs` |
+//! | noise levels, starts from outside | `noise.rs` |
+//! | inputs that act; the loop of a run | `simulation.rs` |
 //! | a user's equations, compiled for all points of a step | `engine.rs` |
-//! | the trait of all simulators; the same parts over whole signals of a black box | `digital_twin.rs`, `black_box.rs`, `sensor_noise.rs`, `known_noise.rs` |
+//! | the trait of all simulators; the same parts over whole signals of a black box | `digital_twin.rs`, `black_box.rs`, `known_noise.rs` |
 
-mod acting;
 mod black_box;
 mod digital_twin;
 mod engine;
 mod known_noise;
-mod levels;
 mod motion;
 mod noise;
 mod part;
 mod parts;
-mod sensor_noise;
 mod signals;
 mod simulation;
 
-pub(crate) use acting::Acting;
 pub use black_box::ComposedBlackBox;
 pub use digital_twin::DigitalTwin;
 pub(in crate::twin) use digital_twin::FREE_RUNS;
-pub(crate) use known_noise::{KnownNoise, NoisePart};
-pub(crate) use levels::{FittedLevels, LevelSource, Setting};
+pub(crate) use known_noise::{KnownNoise, NoisePart, SensorNoise, WhiteLevel};
+pub(crate) use noise::{FittedLevels, LevelSource, Setting};
 pub(crate) use part::{
-    Disturbance, Entry, LARGEST, Law, LawPart, LawPlace, NoiseLaw, OutlierLaw, ParameterChange,
-    RateChange, SignalChange, StateLimit, TwinPart,
+    Disturbance, Entry, LARGEST, Law, LawPart, LawPlace, ParameterChange, RateChange, SignalChange,
+    StateLimit, TwinPart,
 };
-pub(crate) use sensor_noise::{SensorNoise, WhiteLevel};
-pub(crate) use simulation::DeadTime;
+pub(crate) use simulation::{Acting, DeadTime};
 
 use crate::record::{Drive, Signal};
 use crate::twin::integrator::felt;
@@ -214,6 +209,7 @@ impl Composed {
         self.parts.call_hooks()?;
         let outline = &self.parts.outline;
         check_lengths(outline, theta, drive)?;
+        let theta = &self.parts.drawn(theta, noise);
         self.check_parameters(theta, drive.dt())?;
         let mut setup = Setup {
             outline,

@@ -1,7 +1,7 @@
 //! Parts that twins are composed of, and the laws of those parts.
 
-use super::levels::{FittedLevels, Setting};
-use super::sensor_noise::SensorNoise;
+use super::known_noise::SensorNoise;
+use super::noise::{FittedLevels, Setting};
 use crate::twin::points::Layout;
 use crate::twin::{Integrator, Interval, Now, Outliers, SimulationError, Stepping};
 use std::ops::Range;
@@ -161,7 +161,10 @@ impl LawPart {
 
     /// Returns whether it acts on outputs with their noise.
     pub fn is_behind_noise(&self) -> bool {
-        matches!(self.law, Law::Reading(_) | Law::Rounding(_) | Law::Outliers(_))
+        matches!(
+            self.law,
+            Law::Reading(_) | Law::Rounding(_) | Law::Outliers(_)
+        )
     }
 
     /// Returns its place, its memory being these states.
@@ -239,6 +242,8 @@ pub(crate) enum TwinPart {
     },
     /// Noise levels that a record fits.
     Levels(FittedLevels),
+    /// Values of held parameters, from this entry of θ on: each run draws one list of them.
+    Drawn { first: usize, values: Vec<Vec<f64>> },
     /// Noise of the sensors of a black box.
     White(SensorNoise),
     /// Start of a state, and its standard deviation.

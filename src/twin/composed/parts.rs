@@ -3,7 +3,7 @@
 use super::part::{Disturbance, Entry, Law, LawPart, TwinPart};
 use crate::record::Quantity;
 use crate::twin::{
-    Integrator, Interval, Now, Outline, Parameter, ParameterSpace, Stepping, TwinError,
+    Integrator, Interval, Noise, Now, Outline, Parameter, ParameterSpace, Stepping, TwinError,
 };
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -165,6 +165,19 @@ impl Parts {
         (self.held.iter())
             .map(|held| held.unwrap_or_else(|| free.next().copied().unwrap_or(f64::NAN)))
             .collect()
+    }
+
+    /// Returns all of θ for a run with this noise, with those held values that each run draws.
+    pub fn drawn(&self, theta: &[f64], noise: Noise) -> Theta {
+        let mut all = self.complete(theta);
+        for added in &self.list {
+            if let TwinPart::Drawn { first, values } = &added.part {
+                let chosen = noise.source("levels").uniform() * values.len() as f64;
+                let chosen = &values[chosen as usize];
+                all[*first..][..chosen.len()].copy_from_slice(chosen);
+            }
+        }
+        all
     }
 
     /// Returns the parts with priors and bounds as `change` leaves them.

@@ -126,7 +126,8 @@ impl Composed {
                         // Behind the noise nobody remembers.
                         let states = (Layout::dense(1), &[][..]);
                         law.peek(part.m(now.theta), &at, &on, states, (p, y));
-                        changed |= (before.iter().zip(&*y)).any(|(a, b)| a.to_bits() != b.to_bits());
+                        changed |=
+                            (before.iter().zip(&*y)).any(|(a, b)| a.to_bits() != b.to_bits());
                     }
                     _ => {}
                 }

@@ -11,24 +11,84 @@
 //! # Ok::<(), truetwin::record::RecordError>(())
 //! ```
 
-mod finding;
 mod step;
 #[cfg(test)]
 mod tests;
 
-pub use finding::{Finding, Severity};
 pub(crate) use step::{check_step, coarse_step};
 
 use crate::record::{Drive, Signal};
 use crate::twin::{
     DigitalTwin, Noise, PRIOR_DEVIATION, Parameter, ParameterSpace, SimulationError, combination,
 };
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 /// Relative size under which a singular value counts as zero: this direction does not move the free run.
 const FLAT: f64 = 1e-6;
 /// Noise draws of nearby parameters must agree to this part of their spread.
 const PAIRED: f64 = 1e-2;
+
+/// Severity of a finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Severity {
+    /// The check passed.
+    Pass,
+    /// Worth knowing; the twin can be used.
+    Warning,
+    /// The twin breaks a rule that estimation relies on.
+    Failure,
+}
+
+/// The outcome of one check.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Finding {
+    /// Short name of the check.
+    pub check: &'static str,
+    /// Severity.
+    pub severity: Severity,
+    /// The result, and the remedy where there is one.
+    pub message: String,
+}
+
+impl Finding {
+    pub(crate) fn pass(check: &'static str, message: impl Into<String>) -> Self {
+        Self::of(check, Ok(message.into()))
+    }
+
+    pub(crate) fn failure(check: &'static str, message: impl Into<String>) -> Self {
+        Self::of(check, Err((Severity::Failure, message.into())))
+    }
+
+    pub(crate) fn warning(check: &'static str, message: impl Into<String>) -> Self {
+        Self::of(check, Err((Severity::Warning, message.into())))
+    }
+
+    fn of(check: &'static str, outcome: Outcome) -> Self {
+        let (severity, message) = match outcome {
+            Ok(message) => (Severity::Pass, message),
+            Err(found) => found,
+        };
+        Self {
+            check,
+            severity,
+            message,
+        }
+    }
+}
+
+/// Message of a check that passed, or how severe its finding is.
+type Outcome = Result<String, (Severity, String)>;
+
+fn failed(message: impl Into<String>) -> Outcome {
+    Err((Severity::Failure, message.into()))
+}
+
+fn warned(message: impl Into<String>) -> Outcome {
+    Err((Severity::Warning, message.into()))
+}
 
 /// Runs every check under `drive`; `seed` draws the noise and the parameters.
 ///
@@ -44,14 +104,6 @@ const PAIRED: f64 = 1e-2;
 /// `truetwin check` adds *step*: half the step moves no output by more than its noise.
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let space = twin.parameters();
-    // A study may hold all of them.
-    let is_fixed = space.is_empty();
-    let message = match space.check() {
-        _ if is_fixed => "none to estimate".to_owned(),
-        Err(error) => return vec![Finding::failure("parameters", error.to_string())],
-        Ok(()) => format!("{} to estimate: {}", space.len(), space.names().join(", ")),
-    };
-    let mut findings = vec![Finding::pass("parameters", message)];
     let setting = Setting {
         twin,
         drive,
@@ -59,6 +111,10 @@ pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
         centre: space.centre(),
         space,
     };
+    let mut findings = vec![Finding::of("parameters", setting.parameters())];
+    if findings[0].severity > Severity::Pass {
+        return findings;
+    }
     let first = match setting.run(&setting.centre) {
         Ok(outputs) => outputs,
         Err(error) => {
@@ -67,25 +123,19 @@ pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
             return findings;
         }
     };
-    let expected = (drive.samples(), twin.signals().outputs.len());
-    if first.dim() != expected {
-        let message = format!(
-            "outputs are {:?}, {expected:?} (samples, channels) were declared; return one row a sample and one column an output",
-            first.dim()
-        );
-        findings.push(Finding::failure("channels", message));
+    findings.push(Finding::of("channels", setting.channels(&first)));
+    if findings[1].severity > Severity::Pass {
         return findings;
     }
-    let message = format!("{} samples, {} outputs", expected.0, expected.1);
-    findings.push(Finding::pass("channels", message));
-    findings.push(setting.finite());
-    findings.push(setting.repeatable(&first));
     let other = twin.simulate(&setting.centre, drive, Noise::new(seed, "check", 1));
     let spread = other.map_or(0.0, |other| rms(&first, &other));
-    findings.push(noisy(spread));
-    if !is_fixed {
-        findings.push(setting.paired(&first, spread));
-        findings.push(setting.identifiable(spread));
+    findings.push(Finding::of("finite", setting.finite()));
+    findings.push(Finding::of("repeatable", setting.repeatable(&first)));
+    findings.push(Finding::of("noise", noisy(spread)));
+    // A study may hold all parameters.
+    if !setting.space.is_empty() {
+        findings.push(Finding::of("paired", setting.paired(&first, spread)));
+        findings.push(Finding::of("identifiable", setting.identifiable(spread)));
     }
     findings
 }
@@ -102,6 +152,32 @@ struct Setting<'a> {
 impl Setting<'_> {
     fn run(&self, theta: &[f64]) -> Result<Signal, SimulationError> {
         self.twin.simulate(theta, self.drive, self.noise)
+    }
+
+    fn parameters(&self) -> Outcome {
+        let space = &self.space;
+        if space.is_empty() {
+            return Ok("none to estimate".to_owned());
+        }
+        match space.check() {
+            Err(error) => failed(error.to_string()),
+            Ok(()) => Ok(format!(
+                "{} to estimate: {}",
+                space.len(),
+                space.names().join(", ")
+            )),
+        }
+    }
+
+    fn channels(&self, first: &Signal) -> Outcome {
+        let expected = (self.drive.samples(), self.twin.signals().outputs.len());
+        if first.dim() != expected {
+            return failed(format!(
+                "outputs are {:?}, {expected:?} (samples, channels) were declared; return one row a sample and one column an output",
+                first.dim()
+            ));
+        }
+        Ok(format!("{} samples, {} outputs", expected.0, expected.1))
     }
 
     /// Corners of the prior box: all of them up to six parameters, 64 spread ones beyond.
@@ -125,7 +201,7 @@ impl Setting<'_> {
         (0..1usize << self.space.len().min(6)).map(corner).collect()
     }
 
-    fn finite(&self) -> Finding {
+    fn finite(&self) -> Outcome {
         let corners = self.corners();
         let mut bad = corners.iter().filter_map(|theta| {
             let problem = match self.run(theta) {
@@ -136,62 +212,56 @@ impl Setting<'_> {
             Some((theta, problem))
         });
         let Some((theta, problem)) = bad.next() else {
-            let message = format!("finite at the {} corners of the prior", corners.len());
-            return Finding::pass("finite", message);
+            return Ok(format!(
+                "finite at the {} corners of the prior",
+                corners.len()
+            ));
         };
-        let (failed, all) = (bad.count() + 1, corners.len());
+        let (lost, all) = (bad.count() + 1, corners.len());
         let message = format!(
-            "{problem} at the prior's corner {theta:?} ({failed} of {all} corners); such draws are redrawn: shrink the prior or the step"
+            "{problem} at the prior's corner {theta:?} ({lost} of {all} corners); such draws are redrawn: shrink the prior or the step"
         );
-        if failed == all {
-            Finding::failure("finite", message)
-        } else {
-            Finding::warning("finite", message)
-        }
+        let severity = match lost == all {
+            true => Severity::Failure,
+            false => Severity::Warning,
+        };
+        Err((severity, message))
     }
 
-    fn repeatable(&self, first: &Signal) -> Finding {
+    fn repeatable(&self, first: &Signal) -> Outcome {
         match self.run(&self.centre) {
-            Ok(again) if again == *first => {
-                Finding::pass("repeatable", "the same arguments give the same bits")
-            }
-            Err(error) => Finding::failure(
-                "repeatable",
-                format!("a second run with the same arguments failed: {error}"),
-            ),
-            Ok(_) => Finding::failure(
-                "repeatable",
+            Ok(again) if again == *first => Ok("the same arguments give the same bits".into()),
+            Err(error) => failed(format!(
+                "a second run with the same arguments failed: {error}"
+            )),
+            Ok(_) => failed(
                 "two runs with the same arguments differ; take all randomness from `noise` and keep no state between runs",
             ),
         }
     }
 
-    fn paired(&self, first: &Signal, spread: f64) -> Finding {
+    fn paired(&self, first: &Signal, spread: f64) -> Outcome {
         let mut moved = self.centre.clone();
         for (value, width) in moved.iter_mut().zip(self.space.widths()) {
             *value += 1e-9 * width;
         }
         match self.run(&moved).map(|y| rms(first, &y)) {
             Ok(change) if change <= PAIRED * spread || spread == 0.0 => {
-                Finding::pass("paired", "noise draws do not depend on θ")
+                Ok("noise draws do not depend on θ".into())
             }
-            Ok(change) => Finding::failure(
-                "paired",
-                format!(
-                    "1e-9 of the prior's width moves the outputs by {change:.1e} rms (noise: {spread:.1e}): draws depend on θ; open each source of noise by its own name and draw the same number of times"
-                ),
-            ),
-            Err(error) => Finding::failure("paired", error.to_string()),
+            Ok(change) => failed(format!(
+                "1e-9 of the prior's width moves the outputs by {change:.1e} rms (noise: {spread:.1e}): draws depend on θ; open each source of noise by its own name and draw the same number of times"
+            )),
+            Err(error) => failed(error.to_string()),
         }
     }
 
     /// Singular directions of the free run's Jacobian at the prior's centre, θ in units of the prior's width, against the
     /// noise: two noisy runs differ by `spread` rms.
-    fn identifiable(&self, spread: f64) -> Finding {
-        const CHECK: &str = "identifiable";
+    fn identifiable(&self, spread: f64) -> Outcome {
         let jacobian = match self.free_run_jacobian() {
             Ok(jacobian) => jacobian,
-            Err(error) => return Finding::warning(CHECK, format!("not known: {error}")),
+            Err(error) => return warned(format!("not known: {error}")),
         };
         let svd = jacobian.svd(false, true);
         let largest = svd.singular_values.max();
@@ -208,54 +278,48 @@ impl Setting<'_> {
         let flat = named(&|s| s <= FLAT * largest);
         let drowned = named(&|s| s > FLAT * largest && deviation(s) > PRIOR_DEVIATION);
         if !flat.is_empty() {
-            let message = format!(
+            return warned(format!(
                 "the free run does not change along {} (θ over the prior's width): only noise can tell; fix one parameter there, or report combinations",
                 flat.join("; ")
-            );
-            return Finding::warning(CHECK, message);
+            ));
         }
         if !drowned.is_empty() {
-            let message = format!(
+            return warned(format!(
                 "a record of this length tells less than the prior about {} (θ over the prior's width): expect wide intervals there; take longer records or another input",
                 drowned.join("; ")
-            );
-            return Finding::warning(CHECK, message);
+            ));
         }
         let weakest = deviation(svd.singular_values.min());
-        let message = format!(
+        Ok(format!(
             "every direction moves the free run (the weakest is known to about {weakest:.1e} prior widths)"
-        );
-        Finding::pass(CHECK, message)
+        ))
     }
 
     /// ∂(free run)/∂(θ over the prior's width) at the prior's centre, by central differences; N·channels × d.
     fn free_run_jacobian(&self) -> Result<DMatrix<f64>, SimulationError> {
         let widths = self.space.widths();
-        let column = |j: usize| -> Result<Vec<f64>, SimulationError> {
+        let column = |j: usize| -> Result<DVector<f64>, SimulationError> {
             let side = |sign: f64| {
                 let mut theta = self.centre.clone();
                 theta[j] += sign * 1e-4 * widths[j];
                 self.twin.free_run(&theta, self.drive)
             };
             let difference = side(1.0)? - side(-1.0)?;
-            Ok(difference.iter().map(|d| d / 2e-4).collect())
+            let slopes = difference.iter().map(|d| d / 2e-4);
+            Ok(DVector::from_iterator(difference.len(), slopes))
         };
-        let columns: Vec<Vec<f64>> = (0..self.space.len())
+        let columns: Vec<DVector<f64>> = (0..self.space.len())
             .map(column)
             .collect::<Result<_, _>>()?;
-        Ok(DMatrix::from_fn(columns[0].len(), columns.len(), |i, j| {
-            columns[j][i]
-        }))
+        Ok(DMatrix::from_columns(&columns))
     }
 }
 
-fn noisy(spread: f64) -> Finding {
+fn noisy(spread: f64) -> Outcome {
     if spread > 0.0 {
-        let message = format!("two noise samples differ by {spread:.3e} rms");
-        return Finding::pass("noise", message);
+        return Ok(format!("two noise samples differ by {spread:.3e} rms"));
     }
-    Finding::warning(
-        "noise",
+    warned(
         "the twin has no noise: statistics of features cannot be simulated; give it noise levels",
     )
 }

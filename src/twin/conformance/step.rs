@@ -1,6 +1,6 @@
 //! Check of the step: half of it moves no output by more than its noise.
 
-use super::finding::Finding;
+use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
 use crate::record::{Drive, Signal};
 use crate::twin::{Composed, MOST_SUBSTEPS, Noise, Now, SimulationError, Twin};
@@ -28,15 +28,12 @@ pub(crate) fn step_error(
 
 /// Compares the [`step_error`] at θ with the measurement noise of each output; `None` for a black box.
 pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Finding> {
-    const CHECK: &str = "step";
-    Some(match coarse_step(twin, theta, drive)? {
-        Ok(Some(coarse)) => Finding::warning(CHECK, coarse),
-        Ok(None) => Finding::pass(
-            CHECK,
-            "half the step moves no output by more than its noise",
-        ),
-        Err(error) => Finding::warning(CHECK, format!("not known: {error}")),
-    })
+    let outcome: Outcome = match coarse_step(twin, theta, drive)? {
+        Ok(Some(coarse)) => warned(coarse),
+        Ok(None) => Ok("half the step moves no output by more than its noise".into()),
+        Err(error) => warned(format!("not known: {error}")),
+    };
+    Some(Finding::of("step", outcome))
 }
 
 /// Outputs that half of the step moves by more than their noise, with the remedy; `None` for a black box.

@@ -1,5 +1,12 @@
 //! Truths of every kind can be drawn of any twin, and have the information that they are to have.
 
+#[path = "../../../../../examples/own_twin.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod own_twin;
+#[path = "../../../../../examples/rooms.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod rooms;
+
 use super::*;
 use crate::diagnose::fixture::tanks;
 use crate::evaluate::paper::reference_studies;
@@ -9,36 +16,8 @@ use crate::evaluate::trials::truth::sizing::{Experiment, FIRST};
 use crate::study::RecordPlan;
 use crate::twin::{Now, Outline, Parameter, StateSpace};
 use crate::twins::VanDerPol;
-
-/// Three states, two outputs, one input: a heater, a wall, a room.
-pub(super) struct Rooms;
-
-impl StateSpace for Rooms {
-    fn outline(&self) -> Outline {
-        Outline::new()
-            .parameter(Parameter::new("gain", "K/s", 0.5, 1.5).within(0.1, 4.0))
-            .parameter(Parameter::new("loss", "1/s", 0.2, 0.6).within(0.05, 2.0))
-            .state("heater", "K")
-            .state("wall", "K")
-            .state("room", "K")
-            .input("power", "1")
-            .output("wall_sensor", "K")
-            .output("room_sensor", "K")
-    }
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        let (gain, loss) = (now.theta[0], now.theta[1]);
-        dx[0] = gain * now.u[0] - 0.5 * (x[0] - x[1]);
-        dx[1] = 0.3 * (x[0] - x[1]) - 0.2 * (x[1] - x[2]);
-        dx[2] = 0.2 * (x[1] - x[2]) - loss * x[2];
-    }
-    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        y.copy_from_slice(&x[1..]);
-    }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        process.fill(0.005);
-        measurement.fill(0.01);
-    }
-}
+use own_twin::Tank;
+use rooms::Rooms;
 
 pub(super) fn rooms() -> Study {
     rooms_of(200)
@@ -297,29 +276,6 @@ fn departures_that_are_alike_have_no_information_beside_each_other() {
         assert!(information.unexplained(&push, &bias) < 0.01);
         assert!(information.unexplained(&push, &lag) > 0.1);
     });
-}
-
-/// ẋ = (u − k·x)/area.
-struct Tank;
-
-impl StateSpace for Tank {
-    fn outline(&self) -> Outline {
-        Outline::new()
-            .parameter(Parameter::new("k", "m²/s", 0.2, 1.0).within(0.01, 3.0))
-            .parameter(Parameter::new("area", "m²", 0.5, 1.5).within(0.2, 5.0))
-            .state("h", "m")
-            .input("u", "m³/s")
-            .output("y", "m")
-    }
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        dx[0] = (now.u[0] - now.theta[0] * x[0]) / now.theta[1];
-    }
-    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        y[0] = x[0];
-    }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        (process[0], measurement[0]) = (0.01, 0.02);
-    }
 }
 
 /// A gain of the pump is a tank of another area with another outflow, however far away.
