@@ -2,7 +2,7 @@
 
 use super::law::{ForcePoint, NOISE_ENTERS};
 use super::magnitude::Magnitude;
-use super::marks::Mark;
+use super::marks::OutputMark;
 use crate::twin::{Law, Now, Outliers};
 use std::fmt;
 use std::sync::Arc;
@@ -58,7 +58,7 @@ pub struct EffectKind {
     order: u32,
     memory: usize,
     dead_time: bool,
-    mark: Option<fn(&[f64]) -> Mark>,
+    mark: Option<fn(&[f64]) -> OutputMark>,
     check: Option<MagnitudeCheck>,
 }
 
@@ -222,7 +222,7 @@ impl EffectKind {
 
     /// Sets the search for the effect's mark on measured outputs.
     #[must_use]
-    pub(super) fn mark(mut self, mark: fn(&[f64]) -> Mark) -> Self {
+    pub(super) fn mark(mut self, mark: fn(&[f64]) -> OutputMark) -> Self {
         self.mark = Some(mark);
         self
     }
@@ -282,8 +282,8 @@ impl EffectKind {
     }
 
     /// Looks for the effect's mark on measured outputs of its target.
-    pub(crate) fn marks(&self, outputs: &[f64]) -> Mark {
-        self.mark.map_or(Mark::Unmarked, |mark| mark(outputs))
+    pub(crate) fn marks(&self, outputs: &[f64]) -> OutputMark {
+        self.mark.map_or(OutputMark::Unmarked, |mark| mark(outputs))
     }
 
     pub(super) fn check_values(&self, m: &[f64], dt: f64) -> Result<(), String> {

@@ -4,7 +4,7 @@ use crate::record::{distinct, step_of};
 
 /// The mark of an effect on measured outputs, whatever the twin: values that pile up at its ends or steps.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Mark {
+pub(crate) enum OutputMark {
     /// The effect leaves none.
     Unmarked,
     /// It would leave one, and there is none.
@@ -18,11 +18,11 @@ pub(crate) enum Mark {
 const TIES: usize = 4;
 const OFTEN: usize = 3;
 
-/// Mark of a limited range, as (low, high): many samples exactly at the least or the greatest value.
-pub(crate) fn clipped(outputs: &[f64]) -> Mark {
+/// OutputMark of a limited range, as (low, high): many samples exactly at the least or the greatest value.
+pub(crate) fn clipped(outputs: &[f64]) -> OutputMark {
     let values = distinct(outputs);
     if values.len() < 3 {
-        return Mark::Absent;
+        return OutputMark::Absent;
     }
     let mut counts: Vec<usize> = values.iter().map(|(_, count)| *count).collect();
     counts.sort_unstable();
@@ -42,9 +42,9 @@ pub(crate) fn clipped(outputs: &[f64]) -> Mark {
         f64::INFINITY,
     );
     if low.is_finite() || high.is_finite() {
-        Mark::Present(vec![low, high])
+        OutputMark::Present(vec![low, high])
     } else {
-        Mark::Absent
+        OutputMark::Absent
     }
 }
 
@@ -55,12 +55,12 @@ pub(crate) fn on_levels(outputs: &[f64]) -> bool {
 
 /// Returns whether outputs stop at an end of their range: many samples exactly there.
 pub(crate) fn stops(outputs: &[f64]) -> bool {
-    matches!(clipped(outputs), Mark::Present(_))
+    matches!(clipped(outputs), OutputMark::Present(_))
 }
 
-/// Mark of rounding, as its step.
-pub(crate) fn rounded(outputs: &[f64]) -> Mark {
-    step_of(outputs).map_or(Mark::Absent, |step| Mark::Present(vec![step]))
+/// OutputMark of rounding, as its step.
+pub(crate) fn rounded(outputs: &[f64]) -> OutputMark {
+    step_of(outputs).map_or(OutputMark::Absent, |step| OutputMark::Present(vec![step]))
 }
 
 #[cfg(test)]
@@ -76,16 +76,16 @@ mod tests {
 
     #[test]
     fn what_is_neither_clipped_nor_rounded_is_not_marked() {
-        assert_eq!(clipped(&noise()), Mark::Absent);
-        assert_eq!(rounded(&noise()), Mark::Absent);
+        assert_eq!(clipped(&noise()), OutputMark::Absent);
+        assert_eq!(rounded(&noise()), OutputMark::Absent);
         // Nor are the digits of a file.
         let digits: Vec<f64> = noise()
             .iter()
             .map(|v| (v * 100.0).round() / 100.0)
             .collect();
-        assert_eq!(clipped(&digits), Mark::Absent);
-        assert_eq!(rounded(&digits), Mark::Absent);
-        assert_eq!(clipped(&[]), Mark::Absent);
+        assert_eq!(clipped(&digits), OutputMark::Absent);
+        assert_eq!(rounded(&digits), OutputMark::Absent);
+        assert_eq!(clipped(&[]), OutputMark::Absent);
         // Nor are the turning points of a rounded oscillation.
         let wave = |size: f64| -> Vec<f64> {
             (0..300)
@@ -93,23 +93,26 @@ mod tests {
                 .collect()
         };
         for size in [20.0, 20.4, 50.4, 110.4, 200.4] {
-            assert_eq!(clipped(&wave(size)), Mark::Absent, "{size}");
+            assert_eq!(clipped(&wave(size)), OutputMark::Absent, "{size}");
         }
         // The same behind a sensor that stops is marked.
         let behind: Vec<f64> = wave(110.4).iter().map(|y| y.min(9.0)).collect();
         assert_eq!(
             clipped(&behind),
-            Mark::Present(vec![f64::NEG_INFINITY, 9.0])
+            OutputMark::Present(vec![f64::NEG_INFINITY, 9.0])
         );
-        assert_eq!(rounded(&[1.0; 50]), Mark::Absent);
+        assert_eq!(rounded(&[1.0; 50]), OutputMark::Absent);
     }
 
     #[test]
     fn ends_and_steps_are_found() {
         let high: Vec<f64> = noise().iter().map(|v| v.min(0.8)).collect();
-        assert_eq!(clipped(&high), Mark::Present(vec![f64::NEG_INFINITY, 0.8]));
+        assert_eq!(
+            clipped(&high),
+            OutputMark::Present(vec![f64::NEG_INFINITY, 0.8])
+        );
         let coarse: Vec<f64> = noise().iter().map(|v| (v / 0.3).round() * 0.3).collect();
-        let Mark::Present(m) = rounded(&coarse) else {
+        let OutputMark::Present(m) = rounded(&coarse) else {
             panic!("no step");
         };
         assert!((m[0] - 0.3).abs() < 1e-9);
@@ -117,11 +120,11 @@ mod tests {
         let fine: Vec<f64> = (noise().iter())
             .map(|v| ((v / 0.0031).floor() + 0.5) * 0.0031)
             .collect();
-        let Mark::Present(m) = rounded(&fine) else {
+        let OutputMark::Present(m) = rounded(&fine) else {
             panic!("no fine step");
         };
         assert!((m[0] - 0.0031).abs() < 1e-6);
         // Rounded values pile up everywhere, not at the ends.
-        assert_eq!(clipped(&coarse), Mark::Absent);
+        assert_eq!(clipped(&coarse), OutputMark::Absent);
     }
 }

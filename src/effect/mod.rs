@@ -34,6 +34,6 @@ pub use law::ForcePoint;
 pub(crate) use law::TargetKind;
 pub(crate) use library::{clamp, lag};
 pub use magnitude::{Magnitude, Shape};
-pub(crate) use marks::{Mark, clipped, on_levels, rounded, stops};
+pub(crate) use marks::{OutputMark, clipped, on_levels, rounded, stops};
 pub use placed::Effect;
 pub(crate) use placed::{EffectEntry, channel, magnitude_unit};

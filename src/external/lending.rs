@@ -5,11 +5,11 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 /// At most so many things at once: idle ones are lent before new ones are made.
 pub(super) struct Lending<T> {
     most: usize,
-    state: Mutex<State<T>>,
+    state: Mutex<Stock<T>>,
     free: Condvar,
 }
 
-struct State<T> {
+struct Stock<T> {
     idle: Vec<T>,
     /// Lent out or being made.
     lent: usize,
@@ -37,7 +37,7 @@ impl<T> Lending<T> {
     pub fn new(most: usize) -> Self {
         Self {
             most,
-            state: Mutex::new(State {
+            state: Mutex::new(Stock {
                 idle: Vec::new(),
                 lent: 0,
             }),
@@ -85,7 +85,7 @@ impl<T> Lending<T> {
         &mut state.unwrap_or_else(PoisonError::into_inner).idle
     }
 
-    fn lock(&self) -> MutexGuard<'_, State<T>> {
+    fn lock(&self) -> MutexGuard<'_, Stock<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -3,7 +3,7 @@
 use super::magnitude::{Ranges, frequency};
 use super::scales::{Scales, largest};
 use super::term::{Nature, Part, Start, Term, with_terms};
-use crate::effect::{Effect, Magnitude, Mark, TargetKind, on_levels, targets};
+use crate::effect::{Effect, Magnitude, OutputMark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::likelihood::kalman::FilterError;
 use crate::record::Signal;
@@ -45,9 +45,9 @@ impl Library<'_> {
         }
         let mark = match effect.law() {
             Law::Sensor(_) | Law::Rounding(_) => effect.kind().marks(&values),
-            _ => Mark::Unmarked,
+            _ => OutputMark::Unmarked,
         };
-        if mark == Mark::Absent {
+        if mark == OutputMark::Absent {
             // The record refutes it: no value repeats, at an end or anywhere.
             return Ok(vec![]);
         }
@@ -60,7 +60,7 @@ impl Library<'_> {
             let twin = with_terms(self.twin, std::iter::once(&term))?;
             terms.extend(self.ranged(term, &values, &twin, false)?);
         }
-        if let Mark::Present(shown) = mark {
+        if let OutputMark::Present(shown) = mark {
             terms
                 .iter_mut()
                 .for_each(|term| marked(term, &shown, &values));
@@ -85,7 +85,7 @@ impl Library<'_> {
         let (_, values) = self.bent(effect);
         let term = self.ranged(term, &values, self.twin, true)?;
         Ok(term.map(|mut term| {
-            if let Mark::Present(shown) = effect.kind().marks(&values) {
+            if let OutputMark::Present(shown) = effect.kind().marks(&values) {
                 let m = (shown_free(&term, &shown).iter().zip(&term.axes))
                     .map(|(value, axis)| axis.bounds.clamp(*value))
                     .collect();
@@ -208,9 +208,9 @@ impl Library<'_> {
 }
 
 /// Magnitudes that are off in each way to use an effect: of several thresholds, one is used at a time.
-fn ways(effect: &Effect, mark: &Mark) -> Vec<Vec<usize>> {
+fn ways(effect: &Effect, mark: &OutputMark) -> Vec<Vec<usize>> {
     let magnitudes = effect.magnitudes();
-    if let Mark::Present(m) = mark {
+    if let OutputMark::Present(m) = mark {
         return vec![(0..m.len()).filter(|&i| m[i].is_infinite()).collect()];
     }
     let thresholds: Vec<usize> = (0..magnitudes.len())

@@ -1,6 +1,6 @@
 //! Fixed-step integrators that carry the equations from one sample to the next.
 
-use crate::twin::{Interval, Outline};
+use crate::twin::Interval;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
@@ -138,9 +138,9 @@ struct Refined {
 }
 
 impl Workspace {
-    /// For equations of this outline, with these boxes of the states.
+    /// For equations of so many inputs, with these boxes of the states.
     pub(super) fn of(
-        outline: &Outline,
+        inputs: usize,
         limits: &[Interval],
         (integrator, stepping): (Integrator, Stepping),
     ) -> Self {
@@ -148,13 +148,13 @@ impl Workspace {
             Box::new(Refined {
                 substeps: stepping.substeps.max(1),
                 limits: felt(limits),
-                inputs: vec![0.0; outline.inputs.len()],
+                inputs: vec![0.0; inputs],
             })
         });
         Self {
             integrator,
             refined,
-            ..Self::of_states(outline.states.len())
+            ..Self::of_states(limits.len())
         }
     }
 

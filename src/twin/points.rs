@@ -181,7 +181,7 @@ pub(super) fn lanes_one_by_one(
 }
 
 /// States of a twin in lanes, at most.
-const MOST: usize = 4;
+pub(crate) const MOST_STATES: usize = 4;
 
 /// Output of the points of several filters, one after the other.
 #[inline(always)]
@@ -196,7 +196,7 @@ pub(super) fn observe_lanes(
     let points = 1 + 2 * n;
     let (x, y) = (&x[..points * n], &mut y[..points]);
     let buffer = &mut buffer[..points * n];
-    let mut outputs = [0.0; 1 + 2 * MOST];
+    let mut outputs = [0.0; 1 + 2 * MOST_STATES];
     let outputs = &mut outputs[..points];
     for (lane, at) in now.iter().enumerate() {
         gather(x, lane, buffer);
@@ -214,7 +214,7 @@ pub(super) fn noise_lanes(
     measurement: &mut Lanes,
     noise: impl Fn(&Now<'_>, &mut [f64], &mut [f64]),
 ) {
-    let mut levels = [0.0; MOST + 1];
+    let mut levels = [0.0; MOST_STATES + 1];
     let (q, r) = levels[..=n].split_at_mut(n);
     for (lane, at) in now.iter().enumerate() {
         q.fill(0.0);

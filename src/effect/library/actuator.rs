@@ -3,30 +3,23 @@
 use super::super::kind::EffectKind;
 use super::super::magnitude::{Magnitude, Shape};
 use super::shared::{
-    DELAY, DELAY_SAMPLES, HIGH, LOW, TAU, check_delay, clamp, delay, lag, limit_rate,
+    DELAY, DELAY_SAMPLES, ERROR, HIGH, LOW, OFFSET, TAU, WIDTH, check_delay, clamp, delay, lag,
+    limit_rate,
 };
 
 pub(super) fn rows() -> Vec<EffectKind> {
     vec![
-        // A relative error of the scale; −1 is a dead actuator.
+        // A relative error of the scale.
         EffectKind::actuator("actuator-gain", "u·(1 + error)", |m, _, _, u| {
             u * (1.0 + m[0])
         })
         .with_sentence("{place} acts with its command changed by {%error}.")
-        .magnitude(
-            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2])
-                .within(-1.0, f64::INFINITY)
-                .shape(Shape::Share),
-        )
+        .magnitude(ERROR)
         .order(10),
         // A constant error of the zero.
         EffectKind::actuator("actuator-bias", "u + offset", |m, _, _, u| u + m[0])
             .with_sentence("{place} acts with its command plus {offset}.")
-            .magnitude(Magnitude::signed(
-                "offset",
-                "signal",
-                &[-0.3, -0.1, 0.1, 0.3],
-            ))
+            .magnitude(OFFSET)
             .order(20),
         // Commands inside ±width/2 do nothing, larger ones lose that much.
         EffectKind::actuator(
@@ -35,7 +28,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             |m, _, _, u| u - clamp(u, -0.5 * m[0], 0.5 * m[0]),
         )
         .with_sentence("{place} does not act within a dead zone of {width}.")
-        .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]).shape(Shape::Level))
+        .magnitude(WIDTH)
         .order(30),
         // Play: after a reversal nothing moves until it is used up; v starts at the first u.
         EffectKind::actuator(
@@ -47,7 +40,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             },
         )
         .with_sentence("{place} has a play of {width}.")
-        .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]).shape(Shape::Level))
+        .magnitude(WIDTH)
         .memory(1)
         .order(40),
         // A limited range. Where low exceeds high, high wins.

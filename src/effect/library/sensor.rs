@@ -3,7 +3,9 @@
 use super::super::kind::EffectKind;
 use super::super::magnitude::{Magnitude, Shape};
 use super::super::marks::{clipped, rounded};
-use super::shared::{DELAY, DELAY_SAMPLES, HIGH, LOW, TAU, check_delay, clamp, delay, lag};
+use super::shared::{
+    DELAY, DELAY_SAMPLES, ERROR, HIGH, LOW, OFFSET, TAU, check_delay, clamp, delay, lag,
+};
 use crate::twin::Outliers;
 
 pub(super) fn rows() -> Vec<EffectKind> {
@@ -11,22 +13,14 @@ pub(super) fn rows() -> Vec<EffectKind> {
         // A constant error of the zero.
         EffectKind::sensor("sensor-bias", "s + offset", |m, _, _, s| s + m[0])
             .with_sentence("{place} shows the true value plus {offset}.")
-            .magnitude(Magnitude::signed(
-                "offset",
-                "signal",
-                &[-0.3, -0.1, 0.1, 0.3],
-            ))
+            .magnitude(OFFSET)
             .order(10),
-        // A relative error of the scale; −1 is a dead sensor.
+        // A relative error of the scale.
         EffectKind::sensor("sensor-gain", "s·(1 + error)", |m, _, _, s| {
             s * (1.0 + m[0])
         })
         .with_sentence("{place} shows the true value changed by {%error}.")
-        .magnitude(
-            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2])
-                .within(-1.0, f64::INFINITY)
-                .shape(Shape::Share),
-        )
+        .magnitude(ERROR)
         .order(20),
         // A zero that moves steadily from the first sample on.
         EffectKind::sensor("sensor-drift", "s + rate·t", |m, now, _, s| {

@@ -6,6 +6,13 @@ use crate::setting::number;
 /// Samples that a delay keeps: the present one and 63 before it.
 pub(super) const DELAY_SAMPLES: usize = 64;
 
+pub(super) const OFFSET: Magnitude = Magnitude::signed("offset", "signal", &[-0.3, -0.1, 0.1, 0.3]);
+/// A relative error of the scale; −1 is a dead channel.
+pub(super) const ERROR: Magnitude = Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2])
+    .within(-1.0, f64::INFINITY)
+    .shape(Shape::Share);
+pub(super) const WIDTH: Magnitude =
+    Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]).shape(Shape::Level);
 pub(super) const TAU: Magnitude =
     Magnitude::positive("tau", "s", &[1.0, 4.0, 16.0]).shape(Shape::TimeConstant);
 pub(super) const DELAY: Magnitude =

@@ -36,9 +36,9 @@ pub(super) struct ModelDescription {
     pub identifier: String,
     /// No more than one instance may exist.
     pub alone: bool,
-    pub parameters: Vec<Variable>,
-    pub inputs: Vec<Variable>,
-    pub outputs: Vec<Variable>,
+    pub parameters: Vec<FmuVariable>,
+    pub inputs: Vec<FmuVariable>,
+    pub outputs: Vec<FmuVariable>,
     pub start: f64,
     pub stop: Option<f64>,
     pub step: Option<f64>,
@@ -46,7 +46,7 @@ pub(super) struct ModelDescription {
 
 /// A real scalar.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Variable {
+pub(super) struct FmuVariable {
     pub name: String,
     pub unit: String,
     pub reference: u32,
@@ -184,7 +184,7 @@ impl ModelDescription {
             let general = declared.and_then(|name| types.get(name)).cloned();
             let general = general.unwrap_or_default();
             let reference = attribute(node, "valueReference")?;
-            list.push(Variable {
+            list.push(FmuVariable {
                 name: attribute(node, "name")?.into(),
                 unit: own.unit.or(general.unit).unwrap_or_default(),
                 reference: (reference.parse())
@@ -240,7 +240,7 @@ impl ModelDescription {
     }
 }
 
-impl Variable {
+impl FmuVariable {
     /// As a quantity.
     pub fn quantity(&self) -> Quantity {
         Quantity::new(&self.name, &self.unit)
@@ -296,7 +296,7 @@ mod tests {
     fn the_second_version_is_read() {
         let found = ModelDescription::parse(TWO).unwrap();
         assert_eq!((found.version, found.alone), (Version::Two, true));
-        let names = |list: &[Variable]| list.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
+        let names = |list: &[FmuVariable]| list.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
         assert_eq!(names(&found.parameters), ["m"]);
         assert_eq!(
             found.parameters[0].parameter(),
@@ -316,7 +316,11 @@ mod tests {
             <Float64 name="A" valueReference="3" causality="parameter" start="1 2"><Dimension start="2"/></Float64>
             <Float64 name="y" valueReference="4" causality="output"/></ModelVariables></fmiModelDescription>"#;
         let mut found = ModelDescription::parse(text).unwrap();
-        let parameters: Vec<_> = found.parameters.iter().map(Variable::parameter).collect();
+        let parameters: Vec<_> = found
+            .parameters
+            .iter()
+            .map(FmuVariable::parameter)
+            .collect();
         assert_eq!(
             parameters[0],
             Parameter::new("k", "N/m", -6.0, -2.0).within(-40.0, -0.4)

@@ -16,11 +16,11 @@ use crate::record::{Drive, Signal, Signals};
 use crate::study::{RecordPlan, Study, StudyError};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
 use archive::{Archive, refused};
-use description::Variable;
+use description::FmuVariable;
 use instance::Instance;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use worker::{References, Worker};
+use worker::{FmuWorker, References};
 
 /// Settings of an FMU.
 ///
@@ -47,7 +47,7 @@ pub struct FmuSettings {
 /// runs and have a thread each. The FMU runs in this process: if it crashes or hangs, so does this.
 pub struct FmuTwin {
     /// Dropped before the unpacked folder is removed.
-    workers: Lending<Worker>,
+    workers: Lending<FmuWorker>,
     archive: Arc<Archive>,
     references: References,
     start: f64,
@@ -106,8 +106,8 @@ impl FmuTwin {
         // A test instance; those that simulate live on threads of their own.
         drop(Instance::new(&archive).map_err(|e| failed(e.to_string()))?);
         let threads = settings.workers.unwrap_or_else(rayon::current_num_threads);
-        let references = |list: &[Variable]| list.iter().map(|v| v.reference).collect();
-        let quantities = |list: &[Variable]| list.iter().map(Variable::quantity).collect();
+        let references = |list: &[FmuVariable]| list.iter().map(|v| v.reference).collect();
+        let quantities = |list: &[FmuVariable]| list.iter().map(FmuVariable::quantity).collect();
         Ok(Self {
             workers: Lending::new(if description.alone { 1 } else { threads.max(1) }),
             archive,
@@ -119,7 +119,9 @@ impl FmuTwin {
             start: description.start,
             path: path.into(),
             name: name::made_fit(&description.name),
-            parameters: ParameterSpace::new(description.parameters.iter().map(Variable::parameter)),
+            parameters: ParameterSpace::new(
+                description.parameters.iter().map(FmuVariable::parameter),
+            ),
             signals: Signals {
                 inputs: quantities(&description.inputs),
                 outputs: quantities(&description.outputs),
@@ -168,7 +170,7 @@ impl DigitalTwin for FmuTwin {
         check_call(&self.parameters, &self.signals, theta, drive)?;
         let (idle, place) = self.workers.take(false, |_| true);
         let mut worker = idle.unwrap_or_else(|| {
-            Worker::new(self.archive.clone(), self.references.clone(), self.start)
+            FmuWorker::new(self.archive.clone(), self.references.clone(), self.start)
         });
         let outcome = worker.simulate(theta, drive);
         if !matches!(outcome, Err(SimulationError::Fatal(_))) {

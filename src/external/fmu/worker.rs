@@ -24,12 +24,12 @@ struct Job {
 }
 
 /// An instance on its thread; both end with the value.
-pub(super) struct Worker {
+pub(super) struct FmuWorker {
     jobs: Option<Sender<Job>>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Worker {
+impl FmuWorker {
     /// A thread for an instance that starts at `start` seconds; the instance is made with the first simulation.
     pub fn new(archive: Arc<Archive>, references: References, start: f64) -> Self {
         let (jobs, to_do) = channel::<Job>();
@@ -73,7 +73,7 @@ impl Worker {
     }
 }
 
-impl Drop for Worker {
+impl Drop for FmuWorker {
     fn drop(&mut self) {
         self.jobs = None;
         if let Some(thread) = self.thread.take() {

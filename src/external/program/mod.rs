@@ -33,7 +33,7 @@ use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
 use description::Description;
 use health::Health;
 use pool::{Pool, introduce};
-use protocol::Answer;
+use protocol::ProgramAnswer;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use worker::{ProgramCommand, Trouble};
@@ -202,14 +202,14 @@ impl ProgramTwin {
             attempt += 1;
             let fresh = attempt > 1;
             match (self.pool).ask(&line, longest, fresh, &self.description, read) {
-                Ok(Answer::Error(text)) => {
+                Ok(ProgramAnswer::Error(text)) => {
                     return Err(self.health.broken(named(format!("says: {text}"))));
                 }
-                Ok(Answer::Outputs(outputs)) => {
+                Ok(ProgramAnswer::Outputs(outputs)) => {
                     self.health.worked();
                     return Ok(outputs);
                 }
-                Ok(Answer::Diverged(at)) => {
+                Ok(ProgramAnswer::Diverged(at)) => {
                     self.health.worked();
                     return Err(SimulationError::Diverged { at });
                 }

@@ -27,7 +27,7 @@ impl<V: Serialize> Serialize for Named<'_, V> {
 }
 
 #[derive(Serialize)]
-struct Simulate<'a> {
+struct SimulateRequest<'a> {
     request: &'static str,
     id: u64,
     theta: Named<'a, f64>,
@@ -48,7 +48,7 @@ pub(super) fn simulate(
     let names = description.parameters.names();
     let inputs = &description.signals.inputs;
     let columns = drive.inputs().columns().into_iter();
-    let request = Simulate {
+    let request = SimulateRequest {
         request: "simulate",
         id,
         theta: Named(names.into_iter().zip(theta.iter().copied()).collect()),
@@ -76,9 +76,9 @@ pub(super) fn longest_answer(signals: &Signals, samples: usize) -> usize {
         .saturating_add(names + (1 << 16))
 }
 
-/// Answer of a program to a simulation.
+/// ProgramAnswer of a program to a simulation.
 #[derive(Debug, PartialEq)]
-pub(super) enum Answer {
+pub(super) enum ProgramAnswer {
     /// Outputs, samples × channels, all finite.
     Outputs(Signal),
     /// The run left the finite numbers at this time, in seconds.
@@ -92,7 +92,7 @@ pub(super) enum Answer {
     deny_unknown_fields,
     expecting = "an object with id and outputs, diverged or error"
 )]
-struct Told {
+struct ToldAnswer {
     id: u64,
     outputs: Option<BTreeMap<String, Vec<Option<f64>>>>,
     diverged: Option<f64>,
@@ -105,8 +105,8 @@ pub(super) fn answer(
     id: u64,
     signals: &Signals,
     drive: &Drive,
-) -> Result<Answer, String> {
-    let told: Told = match serde_json::from_str(line) {
+) -> Result<ProgramAnswer, String> {
+    let told: ToldAnswer = match serde_json::from_str(line) {
         Ok(told) => told,
         Err(error) => serde_json::from_str(&finite_only(line)).map_err(|_| {
             let error = message(&error.to_string());
@@ -124,7 +124,7 @@ pub(super) fn answer(
         (None, Some(at), None) => {
             let end = drive.time(drive.samples());
             if (0.0..=end).contains(&at) {
-                Ok(Answer::Diverged(at))
+                Ok(ProgramAnswer::Diverged(at))
             } else {
                 Err(format!(
                     "diverged = {}; give a time between 0 and {} s, the end of the record",
@@ -133,7 +133,7 @@ pub(super) fn answer(
                 ))
             }
         }
-        (None, None, Some(text)) => Ok(Answer::Error(excerpt(&text))),
+        (None, None, Some(text)) => Ok(ProgramAnswer::Error(excerpt(&text))),
         _ => Err("exactly one of outputs, diverged (a time in seconds) and error is needed".into()),
     }
 }
@@ -143,7 +143,7 @@ fn stack(
     mut outputs: BTreeMap<String, Vec<Option<f64>>>,
     signals: &Signals,
     drive: &Drive,
-) -> Result<Answer, String> {
+) -> Result<ProgramAnswer, String> {
     let samples = drive.samples();
     let mut signal = Signal::zeros((samples, signals.outputs.len()));
     let mut bad = samples;
@@ -169,8 +169,8 @@ fn stack(
         return Err(format!("{} is no output of this twin", excerpt(name)));
     }
     Ok(match bad < samples {
-        true => Answer::Diverged(drive.time(bad)),
-        false => Answer::Outputs(signal),
+        true => ProgramAnswer::Diverged(drive.time(bad)),
+        false => ProgramAnswer::Outputs(signal),
     })
 }
 
@@ -209,7 +209,7 @@ fn finite_only(line: &str) -> String {
 mod tests {
     use super::*;
 
-    fn read(line: &str) -> Result<Answer, String> {
+    fn read(line: &str) -> Result<ProgramAnswer, String> {
         let drive = Drive::autonomous(0.5, 3).unwrap();
         answer(line, 7, &Signals::default(), &drive)
     }
@@ -241,24 +241,24 @@ mod tests {
     fn answers_are_read() {
         let outputs = read(r#"{"id": 7, "outputs": {"y": [1, 0.25, -3e-7]}}"#).unwrap();
         let expected = Signal::from_shape_vec((3, 1), vec![1.0, 0.25, -3e-7]).unwrap();
-        assert_eq!(outputs, Answer::Outputs(expected));
+        assert_eq!(outputs, ProgramAnswer::Outputs(expected));
         assert_eq!(
             read(r#"{"id": 7, "diverged": 1.2}"#),
-            Ok(Answer::Diverged(1.2))
+            Ok(ProgramAnswer::Diverged(1.2))
         );
         for odd in ["-1", "1.6", "1e300"] {
             let error = read(&format!(r#"{{"id": 7, "diverged": {odd}}}"#)).unwrap_err();
             assert!(error.contains("between 0 and 1.5 s"), "{error}");
         }
         let error = read(r#"{"id": 7, "error": "no\nlicence"}"#);
-        assert_eq!(error, Ok(Answer::Error("no licence".into())));
+        assert_eq!(error, Ok(ProgramAnswer::Error("no licence".into())));
     }
 
     #[test]
     fn what_is_not_finite_is_a_divergence_at_its_time() {
         for word in ["NaN", "-Infinity", "null", "nan", "-nan", "inf"] {
             let line = format!("{{\"id\": 7, \"outputs\": {{\"y\": [1, {word}, 2]}}}}");
-            assert_eq!(read(&line), Ok(Answer::Diverged(0.5)), "{word}");
+            assert_eq!(read(&line), Ok(ProgramAnswer::Diverged(0.5)), "{word}");
         }
         assert_eq!(
             finite_only(r#"{"nan": "a\"NaN", "b": true}"#),

@@ -3,9 +3,6 @@
 use crate::math::{Lanes, Mask, Number};
 use crate::twin::{Composed, Interval, LanePoints, Now, Points, Workspace};
 
-/// States of filters that run side by side, at most.
-pub(super) const MOST_STATES: usize = 4;
-
 /// A number that a filter computes with.
 pub(super) trait FilterNumber: Number {
     /// Puts points into the limits and carries them over a step; the lanes in which a constraint acted.

@@ -1,7 +1,7 @@
 //! Damaged channels: constant, clipped, quantised, with outliers.
 
 use super::{or_pass, present, text, with_unit};
-use crate::effect::{Mark, clipped, rounded};
+use crate::effect::{OutputMark, clipped, rounded};
 use crate::math::{CONSTANT, ends, is_constant, median, quantile};
 use crate::record::{Drive, Record, Signal};
 use crate::study::Study;
@@ -114,7 +114,7 @@ pub(super) fn check(
 
 /// The end that values pile up at, and how many of them.
 fn clipped_ends(values: &[f64]) -> Option<(&'static str, f64, usize)> {
-    let Mark::Present(limits) = clipped(values) else {
+    let OutputMark::Present(limits) = clipped(values) else {
         return None;
     };
     let (low, high) = ends(values);
@@ -128,7 +128,7 @@ fn clipped_ends(values: &[f64]) -> Option<(&'static str, f64, usize)> {
 
 /// The step of values that are few.
 fn coarse_step(values: &[f64]) -> Option<f64> {
-    let Mark::Present(steps) = rounded(values) else {
+    let OutputMark::Present(steps) = rounded(values) else {
         return None;
     };
     let (low, high) = ends(values);

@@ -4,7 +4,7 @@ mod level;
 
 pub(crate) use level::{DeclaredNoise, NoiseLevel, Per, StartLevel};
 
-use super::composed::Setting;
+use super::composed::LevelValue;
 use crate::record::Quantity;
 use crate::twin::{
     Composed, Interval, Now, Outline, Parameter, ParameterSpace, Role, Twin, TwinError, TwinPart,
@@ -101,7 +101,7 @@ fn adapt_equations(
         level.check(name)?;
         let is_process = index < states.len();
         let setting = match level {
-            NoiseLevel::Declared(DeclaredNoise { std, per, .. }) => Setting::Known(match per {
+            NoiseLevel::Declared(DeclaredNoise { std, per, .. }) => LevelValue::Known(match per {
                 Per::Second if is_process => std * step.sqrt(),
                 _ => std,
             }),
@@ -109,7 +109,7 @@ fn adapt_equations(
                 let level = levels[index];
                 let guess = (level > 0.0).then(|| Interval::unchecked(0.1 * level, 3.0 * level));
                 added.push(unknown_level(adaptation, name, guess)?);
-                Setting::Parameter(twin.entries() + added.len() - 1)
+                LevelValue::Parameter(twin.entries() + added.len() - 1)
             }
         };
         parts.push(TwinPart::Level {
@@ -127,11 +127,11 @@ fn adapt_equations(
         let limit = limits[state];
         level.check(name, limit)?;
         let (mean, std) = match level {
-            StartLevel::Declared { mean, std } => (Setting::Known(mean), std),
+            StartLevel::Declared { mean, std } => (LevelValue::Known(mean), std),
             StartLevel::Estimate => {
                 let guess = Some(limit).filter(|limit| limit.is_finite());
                 added.push(unknown(adaptation, Role::Start, name, guess)?);
-                (Setting::Parameter(twin.entries() + added.len() - 1), 0.0)
+                (LevelValue::Parameter(twin.entries() + added.len() - 1), 0.0)
             }
         };
         parts.push(TwinPart::Start { state, mean, std });

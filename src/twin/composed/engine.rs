@@ -1,6 +1,6 @@
 //! A user's equations as the engine calls them: one call for all points of a step, compiled for each twin with its equations inline.
 
-use super::simulation::{DeadTime, Setup, Simulated, check_lengths, simulate};
+use super::simulation::{DeadTime, RunSetup, RunningTwin, check_lengths, simulate};
 use super::{Acting, Composed};
 use crate::math::{LANES, Lanes};
 use crate::record::{Drive, Signal, Signals};
@@ -62,7 +62,7 @@ pub(crate) trait Engine: StateSpace {
     fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES];
 
     /// One run of the equations alone.
-    fn run(&self, setup: Setup<'_>, noise: Noise) -> Result<Signal, SimulationError>;
+    fn run(&self, setup: RunSetup<'_>, noise: Noise) -> Result<Signal, SimulationError>;
 }
 
 impl<T: StateSpace> Engine for T {
@@ -159,7 +159,7 @@ impl<T: StateSpace> Engine for T {
         readout_lanes(now, y, |now, y| self.readout_points(now, 1, y))
     }
 
-    fn run(&self, setup: Setup<'_>, noise: Noise) -> Result<Signal, SimulationError> {
+    fn run(&self, setup: RunSetup<'_>, noise: Noise) -> Result<Signal, SimulationError> {
         simulate(&Alone(self), setup, noise)
     }
 }
@@ -202,12 +202,12 @@ fn run_alone<T: StateSpace>(
     check_lengths(&outline, theta, drive)?;
     twin.check_parameters(theta, drive.dt())?;
     let (limits, stepping) = (twin.limits(), twin.stepping());
-    let setup = Setup {
+    let setup = RunSetup {
         outline: &outline,
         limits: felt(&limits),
         acting: Acting::plain(theta, drive, stepping.hold),
         dead_time: DeadTime::NONE,
-        work: Workspace::of(&outline, &limits, (twin.integrator(), stepping)),
+        work: Workspace::of(outline.inputs.len(), &limits, (twin.integrator(), stepping)),
     };
     simulate(&Alone(twin), setup, noise)
 }
@@ -234,7 +234,7 @@ fn carry<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Works
 /// A user's equations without any parts, in a run.
 struct Alone<'t, T>(&'t T);
 
-impl<T: StateSpace> Simulated for Alone<'_, T> {
+impl<T: StateSpace> RunningTwin for Alone<'_, T> {
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         self.0.start(now, x);
     }

@@ -26,10 +26,9 @@ pub use black_box::ComposedBlackBox;
 pub use digital_twin::DigitalTwin;
 pub(in crate::twin) use digital_twin::FREE_RUNS;
 pub(crate) use known_noise::{KnownNoise, NoisePart, SensorNoise, WhiteLevel};
-pub(crate) use noise::{FittedLevels, LevelSource, Setting};
 pub(crate) use part::{
-    Disturbance, Entry, LARGEST, Law, LawPart, LawPlace, ParameterChange, RateChange, SignalChange,
-    StateLimit, TwinPart,
+    Disturbance, Entry, FittedLevels, LARGEST, Law, LawPart, LawPlace, LevelSource, LevelValue,
+    ParameterChange, RateChange, SignalChange, StateLimit, TwinPart,
 };
 pub(crate) use simulation::{Acting, DeadTime};
 
@@ -42,7 +41,7 @@ use crate::twin::{
 use engine::Engine;
 pub(in crate::twin) use parts::Parts;
 pub(in crate::twin) use parts::Theta;
-use simulation::{Setup, check_lengths, simulate};
+use simulation::{RunSetup, check_lengths, simulate};
 use std::sync::Arc;
 
 /// Equations of a twin with all parts that are added to them, as filters and simulations see them; cheap to clone.
@@ -130,7 +129,7 @@ impl Composed {
     /// Returns buffers for its motion.
     pub(crate) fn workspace(&self) -> Workspace {
         let rule = (self.integrator(), self.stepping());
-        Workspace::of(&self.parts.outline, self.limits(), rule)
+        Workspace::of(self.parts.outline.inputs.len(), self.limits(), rule)
     }
 
     /// Returns all of θ from the free entries.
@@ -211,7 +210,7 @@ impl Composed {
         check_lengths(outline, theta, drive)?;
         let theta = &self.parts.drawn(theta, noise);
         self.check_parameters(theta, drive.dt())?;
-        let mut setup = Setup {
+        let mut setup = RunSetup {
             outline,
             limits: felt(self.limits()),
             acting: Acting::of(self, theta, drive)?,

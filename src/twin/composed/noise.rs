@@ -1,6 +1,6 @@
 //! Noise levels and starts: of composed equations, from outside a twin, from a record.
 
-use super::{Composed, Disturbance, Law, TwinPart};
+use super::{Composed, Disturbance, FittedLevels, Law, LevelSource, TwinPart};
 use crate::twin::Now;
 
 impl Composed {
@@ -66,42 +66,6 @@ fn join(level: &mut f64, added: f64) {
     if added != 0.0 {
         *level = level.hypot(added);
     }
-}
-
-/// A start or noise level.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Setting {
-    Known(f64),
-    /// Entry of θ.
-    Parameter(usize),
-}
-
-impl Setting {
-    /// Returns its value.
-    pub fn value(self, theta: &[f64]) -> f64 {
-        match self {
-            Self::Known(value) => value,
-            Self::Parameter(entry) => theta[entry],
-        }
-    }
-}
-
-/// Origin of a noise level.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum LevelSource {
-    /// The twin.
-    Declared,
-    /// An entry of θ; the twin's own level, in the parameter's unit, says how it depends on time and θ.
-    Fitted { entry: usize, declared: f64 },
-}
-
-/// Noise levels of states and outputs that a record fits.
-#[derive(Debug, Clone)]
-pub(crate) struct FittedLevels {
-    /// Step of the study, in seconds: declared levels of states are those of an increment in it.
-    pub step: f64,
-    pub process: Vec<LevelSource>,
-    pub measurement: Vec<LevelSource>,
 }
 
 impl FittedLevels {

@@ -1,7 +1,6 @@
 //! Parts that twins are composed of, and the laws of those parts.
 
 use super::known_noise::SensorNoise;
-use super::noise::{FittedLevels, Setting};
 use crate::twin::points::Layout;
 use crate::twin::{Integrator, Interval, Now, Outliers, SimulationError, Stepping};
 use std::ops::Range;
@@ -224,6 +223,42 @@ impl Disturbance {
     }
 }
 
+/// A start or noise level.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum LevelValue {
+    Known(f64),
+    /// Entry of θ.
+    Parameter(usize),
+}
+
+impl LevelValue {
+    /// Returns its value.
+    pub fn value(self, theta: &[f64]) -> f64 {
+        match self {
+            Self::Known(value) => value,
+            Self::Parameter(entry) => theta[entry],
+        }
+    }
+}
+
+/// Origin of a noise level.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum LevelSource {
+    /// The twin.
+    Declared,
+    /// An entry of θ; the twin's own level, in the parameter's unit, says how it depends on time and θ.
+    Fitted { entry: usize, declared: f64 },
+}
+
+/// Noise levels of states and outputs that a record fits.
+#[derive(Debug, Clone)]
+pub(crate) struct FittedLevels {
+    /// Step of the study, in seconds: declared levels of states are those of an increment in it.
+    pub step: f64,
+    pub process: Vec<LevelSource>,
+    pub measurement: Vec<LevelSource>,
+}
+
 /// A part of a composed twin. Entries of θ count held parameters, too.
 #[derive(Clone)]
 pub(crate) enum TwinPart {
@@ -237,7 +272,7 @@ pub(crate) enum TwinPart {
     Level {
         is_process: bool,
         target: usize,
-        level: Setting,
+        level: LevelValue,
         step: f64,
     },
     /// Noise levels that a record fits.
@@ -249,7 +284,7 @@ pub(crate) enum TwinPart {
     /// Start of a state, and its standard deviation.
     Start {
         state: usize,
-        mean: Setting,
+        mean: LevelValue,
         std: f64,
     },
     /// Standard deviation of a start for which none is declared.

@@ -100,7 +100,7 @@ impl<'d> Acting<'d> {
 }
 
 /// Equations in a run, without what acts before it and on its finished outputs.
-pub(super) trait Simulated {
+pub(super) trait RunningTwin {
     fn start(&self, now: &Now<'_>, x: &mut [f64]);
     fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]);
     fn begin(&self, now: &Now<'_>, x: &mut [f64]);
@@ -111,7 +111,7 @@ pub(super) trait Simulated {
     fn constrain(&self, now: &Now<'_>, x: &mut [f64]);
 }
 
-impl Simulated for Composed {
+impl RunningTwin for Composed {
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         self.start(now, x);
     }
@@ -139,7 +139,7 @@ impl Simulated for Composed {
 }
 
 /// One run before its first sample.
-pub(crate) struct Setup<'s> {
+pub(crate) struct RunSetup<'s> {
     pub outline: &'s Outline,
     /// Boxes that are felt, by state.
     pub limits: Vec<(usize, Interval)>,
@@ -150,11 +150,11 @@ pub(crate) struct Setup<'s> {
 
 /// The simulation loop. Allocates its buffers once; nothing inside the loop.
 pub(super) fn simulate(
-    twin: &impl Simulated,
-    setup: Setup<'_>,
+    twin: &impl RunningTwin,
+    setup: RunSetup<'_>,
     noise: Noise,
 ) -> Result<Signal, SimulationError> {
-    let Setup {
+    let RunSetup {
         outline,
         limits,
         acting,
@@ -256,7 +256,7 @@ impl DeadTime {
 
 /// Moves the start by draws of its own deviations, within the limits.
 fn draw_start(
-    twin: &impl Simulated,
+    twin: &impl RunningTwin,
     now: &Now<'_>,
     (outline, limits): (&Outline, &[(usize, Interval)]),
     noise: Noise,

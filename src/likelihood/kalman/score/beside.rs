@@ -3,13 +3,13 @@
 //! Each number of the recursion is eight numbers ([`Lanes`]), one for each θ, which the processor handles together. The twin's equations stay
 //! plain f64 and are called for one lane after the other.
 
-use crate::likelihood::kalman::number::MOST_STATES;
 use crate::likelihood::kalman::order::Order;
 use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
 use crate::likelihood::kalman::size::{Size, with_size};
 use crate::likelihood::kalman::update::Readings;
 use crate::likelihood::kalman::{Kalman, Method};
 use crate::math::{Kernel, LANES, Lanes, widest};
+use crate::twin::MOST_STATES;
 
 /// Innovation and its variance, row by row; 0 and 1 where the output is missing.
 pub(super) type LaneRows = Vec<[Lanes; 2]>;
