@@ -96,10 +96,8 @@ impl Catalogue {
 
     /// Returns whether a pattern names a kind, or a kind at one of the targets of this twin.
     pub(crate) fn knows(&self, pattern: &EffectPattern, twin: &Twin) -> bool {
-        if pattern.target.is_none() {
-            return self.kind(&pattern.id).is_ok();
-        }
-        (self.applicable(twin).iter()).any(|effect| pattern.matches(effect.key()))
+        let known = || self.applicable(twin);
+        self.kind(pattern.as_str()).is_ok() || known().iter().any(|e| pattern.matches(e.key()))
     }
 }
 

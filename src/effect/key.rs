@@ -51,59 +51,29 @@ impl FromStr for EffectKey {
 
 /// Effects chosen by name: an id, at every target, or `id@target`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(from = "String", into = "String")]
-pub struct EffectPattern {
-    /// Id of the kind.
-    pub id: String,
-    /// The target; every target if none.
-    pub target: Option<String>,
-}
+#[serde(transparent)]
+pub struct EffectPattern(String);
 
 impl EffectPattern {
     /// Returns whether the pattern names this effect.
     pub fn matches(&self, key: &EffectKey) -> bool {
-        self.id == key.id && self.target.as_ref().is_none_or(|t| *t == key.target)
+        self.0 == key.id || self.0 == key.to_string()
+    }
+
+    /// Returns the text, with a target or without.
+    pub(crate) fn as_str(&self) -> &str {
+        &self.0
     }
 }
 
 impl From<&str> for EffectPattern {
     fn from(text: &str) -> Self {
-        match text.parse::<EffectKey>() {
-            Ok(key) => key.into(),
-            Err(_) => Self {
-                id: text.into(),
-                target: None,
-            },
-        }
+        Self(text.into())
     }
 }
 
 impl From<String> for EffectPattern {
     fn from(text: String) -> Self {
-        text.as_str().into()
-    }
-}
-
-impl From<EffectKey> for EffectPattern {
-    fn from(key: EffectKey) -> Self {
-        Self {
-            id: key.id,
-            target: Some(key.target),
-        }
-    }
-}
-
-impl From<EffectPattern> for String {
-    fn from(pattern: EffectPattern) -> Self {
-        pattern.to_string()
-    }
-}
-
-impl fmt::Display for EffectPattern {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.target {
-            Some(target) => write!(f, "{}@{target}", self.id),
-            None => f.write_str(&self.id),
-        }
+        Self(text)
     }
 }

@@ -6,12 +6,10 @@
 use crate::twin::{
     Law, LawPlace, Layout, Now, ParameterChange, RateChange, SignalChange, StateLimit,
 };
+use smallvec::SmallVec;
 
 /// Position along a sensor's signal at which the measurement noise enters.
 pub(crate) const NOISE_ENTERS: u32 = 70;
-
-/// Memories that a look at a signal copies without the heap.
-const SHORT: usize = 8;
 
 /// Everything that a force may depend on.
 #[derive(Debug, Clone, Copy)]
@@ -125,17 +123,11 @@ where
                 }
             }
             length => {
-                let (mut few, mut many) = ([0.0; SHORT], vec![]);
-                let copy = match few.get_mut(..length) {
-                    Some(copy) => copy,
-                    None => {
-                        many.resize(length, 0.0);
-                        &mut many[..]
-                    }
-                };
+                // Short memories are copied without the heap.
+                let mut copy = SmallVec::<[f64; 8]>::from_elem(0.0, length);
                 for (x, y) in at.each(x).zip(outputs) {
                     copy.copy_from_slice(&x[memory.clone()]);
-                    y[target] = self(m, now, copy, y[target]);
+                    y[target] = self(m, now, &mut copy, y[target]);
                 }
             }
         }

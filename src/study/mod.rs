@@ -295,12 +295,12 @@ impl Study {
     /// Adds to the name of an unknown effect the known one that is nearest.
     pub(crate) fn with_nearest_effect(&self, pattern: &EffectPattern) -> String {
         let effects = self.effects();
-        let known = effects.iter().map(|e| match pattern.target {
-            Some(_) => e.key().to_string(),
-            None => e.id().to_owned(),
+        let name = pattern.as_str();
+        let known = effects.iter().map(|e| match name.parse::<EffectKey>() {
+            Ok(_) => e.key().to_string(),
+            Err(_) => e.id().to_owned(),
         });
-        let name = pattern.to_string();
-        format!("{name}{}", did_you_mean(&name, known))
+        format!("{name}{}", did_you_mean(name, known))
     }
 
     /// Returns all effects that this program knows.

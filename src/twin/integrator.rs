@@ -120,11 +120,17 @@ pub enum Integrator {
 /// Buffers of one twin that outlive a step, so that the loop allocates nothing.
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
-    slopes: [Vec<f64>; 4],
-    stage: Vec<f64>,
+    stages: Stages,
     integrator: Integrator,
     /// Substeps and lines of inputs; `None` where a sample is one step and inputs are held.
-    refined: Option<Box<Refined>>,
+    refined: Option<Refined>,
+}
+
+/// Buffers of a step.
+#[derive(Debug, Clone)]
+pub(super) struct Stages {
+    slopes: [Vec<f64>; 4],
+    stage: Vec<f64>,
 }
 
 /// Rule by which a twin moves between samples.
@@ -144,27 +150,14 @@ impl Workspace {
         limits: &[Interval],
         (integrator, stepping): (Integrator, Stepping),
     ) -> Self {
-        let refined = (stepping != Stepping::default()).then(|| {
-            Box::new(Refined {
+        Self {
+            stages: Stages::of(limits.len()),
+            integrator,
+            refined: (stepping != Stepping::default()).then(|| Refined {
                 substeps: stepping.substeps.max(1),
                 limits: felt(limits),
                 inputs: vec![0.0; inputs],
-            })
-        });
-        Self {
-            integrator,
-            refined,
-            ..Self::of_states(limits.len())
-        }
-    }
-
-    /// For `states` states, without substeps.
-    fn of_states(states: usize) -> Self {
-        Self {
-            slopes: std::array::from_fn(|_| vec![0.0; states]),
-            stage: vec![0.0; states],
-            integrator: Integrator::Euler,
-            refined: None,
+            }),
         }
     }
 
@@ -172,6 +165,12 @@ impl Workspace {
     #[inline]
     pub(super) fn is_plain(&self) -> bool {
         self.refined.is_none() && self.integrator == Integrator::Euler
+    }
+
+    /// Buffers of a single step.
+    #[inline]
+    pub(super) fn stages(&mut self) -> &mut Stages {
+        &mut self.stages
     }
 
     /// Carries points of `n` states each over one sample, in the substeps of the twin.
@@ -183,19 +182,26 @@ impl Workspace {
         x: &mut [f64],
         drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
-        let rule = self.integrator;
-        match self.refined.take() {
-            Some(mut refined) => {
-                rule.substeps(n, now, x, (self, &mut refined), drift);
-                self.refined = Some(refined);
-            }
-            None => rule.step(now, x, self, drift),
+        let (rule, stages) = (self.integrator, &mut self.stages);
+        match &mut self.refined {
+            Some(refined) => rule.substeps(n, now, x, (stages, refined), drift),
+            None => rule.step(now, x, stages, drift),
         }
     }
 
     /// A buffer for `states` states.
     pub(super) fn stage(&mut self, states: usize) -> &mut [f64] {
-        grown(&mut self.stage, states)
+        grown(&mut self.stages.stage, states)
+    }
+}
+
+impl Stages {
+    /// For `states` states.
+    fn of(states: usize) -> Self {
+        Self {
+            slopes: std::array::from_fn(|_| vec![0.0; states]),
+            stage: vec![0.0; states],
+        }
     }
 }
 
@@ -219,11 +225,11 @@ fn grown(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
 impl Integrator {
     /// One step in place, the input held: `x(t)` becomes `x(t + Δt)` under `drift(now, x, dx)`.
     #[inline]
-    pub(crate) fn step(
+    pub(super) fn step(
         self,
         now: &Now<'_>,
         x: &mut [f64],
-        work: &mut Workspace,
+        work: &mut Stages,
         mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
         self.step_in_stages(now, x, work, |_, now, x, dx| drift(now, x, dx));
@@ -237,7 +243,7 @@ impl Integrator {
         n: usize,
         now: &Now<'_>,
         x: &mut [f64],
-        (work, refined): (&mut Workspace, &mut Refined),
+        (work, refined): (&mut Stages, &mut Refined),
         mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
         let m = refined.substeps;
@@ -282,7 +288,7 @@ impl Integrator {
         self,
         now: &Now<'_>,
         x: &mut [f64],
-        work: &mut Workspace,
+        work: &mut Stages,
         mut drift: impl FnMut(f64, &Now<'_>, &[f64], &mut [f64]),
     ) {
         let dt = now.dt;
@@ -338,7 +344,7 @@ mod tests {
 
     /// Global error of ẋ = −x + t at t = 1, whose solution is 2e^{−t} + t − 1.
     fn error(integrator: Integrator, steps: usize) -> f64 {
-        let (dt, mut x, mut work) = (1.0 / steps as f64, [1.0], Workspace::of_states(1));
+        let (dt, mut x, mut work) = (1.0 / steps as f64, [1.0], Stages::of(1));
         for k in 0..steps {
             let now = Now::new(k as f64 * dt, dt, &[], &[]);
             integrator.step(&now, &mut x, &mut work, |now, x, dx| dx[0] = now.t - x[0]);

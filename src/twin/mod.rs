@@ -43,5 +43,5 @@ pub(crate) use noise::mix;
 pub use noise::{Noise, Source};
 pub(crate) use parameter::{PRIOR_DEVIATION, combination, oriented};
 pub use parameter::{Parameter, ParameterSpace, Role};
-pub(crate) use points::{LanePoints, Layout, MOST_STATES, Points};
+pub(crate) use points::{Layout, MOST_STATES, Points};
 pub use state_space::{Outliers, Outline, StateSpace};

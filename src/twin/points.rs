@@ -38,33 +38,19 @@ impl Layout {
     }
 }
 
-/// Points that a filter carries over a step; n states each, one point after the other.
+/// Points that a filter carries over a step, or several filters side by side, one a lane; n states each, one point after the other.
 #[derive(Debug)]
-pub(crate) struct Points<'w> {
+pub(crate) struct Points<'w, N = f64> {
     /// First the `moving` points: put into the limits, advanced, constrained; the first is the centre. Behind them two for each state: the
-    /// centre after its motion, with that state shifted up and down, constrained. Those of a state without shift hold nothing of use.
-    pub all: &'w mut [f64],
-    /// Number of moving points.
+    /// centre after its motion, with that state shifted up and down, constrained. Those of a state without shift hold nothing of use, nor do
+    /// those of a lane where no constraint acted.
+    pub all: &'w mut [N],
+    /// Number of moving points; one and two for each state in lanes.
     pub moving: usize,
     /// Limits by state.
     pub limits: &'w [Interval],
     /// Shift of each state.
-    pub shifts: &'w [f64],
-}
-
-/// Points of several filters side by side, one filter a lane; as [`Points`] otherwise.
-#[derive(Debug)]
-pub(crate) struct LanePoints<'w> {
-    /// One moving point and two for each state, then two for each state. The last come back where a constraint acted.
-    pub all: &'w mut [Lanes],
-    /// Limits by state.
-    pub limits: &'w [Interval],
-    /// Shift of each state.
-    pub shifts: &'w [Lanes],
-    /// A buffer for the points of one lane.
-    pub one: &'w mut [f64],
-    /// A buffer for the shifts of one lane.
-    pub shift: &'w mut [f64],
+    pub shifts: &'w [N],
 }
 
 /// Copies one lane out.
@@ -149,17 +135,19 @@ pub(super) fn advance_one_by_one(
     bent | changes(centre, constrain)
 }
 
-/// Carries the points of several filters, one after the other; returns the lanes in which a constraint acted.
+/// Carries the points of several filters, one after the other; returns the lanes in which a constraint acted. The buffers hold points and
+/// shifts of one lane.
 #[inline(always)]
 pub(super) fn lanes_one_by_one(
     n: usize,
     now: &[Now<'_>],
-    points: LanePoints<'_>,
+    points: Points<'_, Lanes>,
+    (one, shift): (&mut [f64], &mut [f64]),
     mut advance: impl FnMut(&Now<'_>, Points<'_>) -> bool,
 ) -> [bool; LANES] {
     let (moving, length) = (1 + 2 * n, (1 + 4 * n) * n);
-    let (all, one) = (&mut points.all[..length], &mut points.one[..length]);
-    let (shifts, shift) = (&points.shifts[..n], &mut points.shift[..n]);
+    let (all, one) = (&mut points.all[..length], &mut one[..length]);
+    let (shifts, shift) = (&points.shifts[..n], &mut shift[..n]);
     let mut bent = [false; LANES];
     for (lane, at) in now.iter().enumerate() {
         gather(&all[..moving * n], lane, &mut one[..moving * n]);

@@ -65,33 +65,12 @@ impl Description {
             message(&problem)
         })?;
         name::check(&told.name).map_err(|problem| format!("name: {problem}"))?;
-        let names = |all: &[ToldQuantity]| all.iter().map(|q| q.name.clone()).collect();
-        let parameters: Vec<String> = told.parameters.iter().map(|p| p.name.clone()).collect();
-        let lists: [(&str, Vec<String>); 3] = [
-            ("parameters", parameters),
-            ("inputs", names(&told.inputs)),
-            ("outputs", names(&told.outputs)),
-        ];
-        for (what, names) in &lists {
-            if names.len() > MOST {
-                return Err(format!("{} {what}; at most {MOST} are read", names.len()));
-            }
-            name::check_all(what, names.iter().map(String::as_str))?;
-        }
-        let quantities = told.inputs.iter().chain(&told.outputs).map(|q| &q.unit);
-        for unit in told.parameters.iter().map(|p| &p.unit).chain(quantities) {
-            name::check_unit(unit)?;
-        }
-        if told.outputs.is_empty() {
-            return Err("no output; name at least one".into());
-        }
         let parameters = ParameterSpace::new(told.parameters.iter().map(|p| {
             let bounds = p.bounds.unwrap_or(p.prior);
             Parameter::new(&p.name, &p.unit, p.prior.low(), p.prior.high())
                 .within(bounds.low(), bounds.high())
         }));
-        parameters.check().map_err(|error| error.to_string())?;
-        let quantities = |all: &[ToldQuantity]| {
+        let quantities = |all: &[ToldQuantity]| -> Vec<Quantity> {
             (all.iter())
                 .map(|q| Quantity::new(&q.name, &q.unit))
                 .collect()
@@ -100,6 +79,16 @@ impl Description {
             inputs: quantities(&told.inputs),
             outputs: quantities(&told.outputs),
         };
+        check_list("parameters", parameters.iter().map(|p| (&p.name, &p.unit)))?;
+        check_list("inputs", signals.inputs.iter().map(|q| (&q.name, &q.unit)))?;
+        check_list(
+            "outputs",
+            signals.outputs.iter().map(|q| (&q.name, &q.unit)),
+        )?;
+        if signals.outputs.is_empty() {
+            return Err("no output; name at least one".into());
+        }
+        parameters.check().map_err(|error| error.to_string())?;
         let record = plan(&told.record)?;
         // Inputs may be left to a study file; all that is said is checked here.
         if signals.inputs.is_empty() || record.input.is_some() {
@@ -114,6 +103,21 @@ impl Description {
             record,
         })
     }
+}
+
+/// Checks number, names and units of a list.
+fn check_list<'a>(
+    what: &str,
+    list: impl ExactSizeIterator<Item = (&'a String, &'a String)> + Clone,
+) -> Result<(), String> {
+    if list.len() > MOST {
+        return Err(format!("{} {what}; at most {MOST} are read", list.len()));
+    }
+    name::check_all(what, list.clone().map(|(name, _)| name.as_str()))?;
+    for (_, unit) in list {
+        name::check_unit(unit)?;
+    }
+    Ok(())
 }
 
 fn plan(table: &RecordTable) -> Result<RecordPlan, String> {

@@ -15,11 +15,11 @@
 //! *Automatica* 36 (2000), with h² = 3.
 
 use super::gaussian::Columns;
-use super::number::{Buffers, Call, FilterNumber, MovingPoints};
+use super::number::{Buffers, Call, FilterNumber};
 use super::size::{Buffer, Size};
 use super::{Kalman, Method, linearised};
 use crate::math::{Condition, Kernel, Number, widest};
-use crate::twin::{Composed, Interval, Now};
+use crate::twin::{Composed, Interval, Now, Points};
 use std::f64::consts::SQRT_2;
 
 /// √3: points of the three-point Gauss–Hermite rule, in standard deviations.
@@ -129,7 +129,7 @@ impl<'a, S: Size, N: FilterNumber> Moments<'a, S, N> {
                 }
             }
         }
-        let points = MovingPoints {
+        let points = Points {
             all,
             moving,
             limits: match method {

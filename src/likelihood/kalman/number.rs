@@ -1,12 +1,12 @@
 //! Calls of the twin by a filter, whose numbers are one or those of several filters side by side. The twin's equations are plain f64.
 
 use crate::math::{Lanes, Mask, Number};
-use crate::twin::{Composed, Interval, LanePoints, Now, Points, Workspace};
+use crate::twin::{Composed, Now, Points, Workspace};
 
 /// A number that a filter computes with.
 pub(super) trait FilterNumber: Number {
     /// Puts points into the limits and carries them over a step; the lanes in which a constraint acted.
-    fn advance(call: Call<'_, '_>, points: MovingPoints<'_, Self>) -> Self::Condition;
+    fn advance(call: Call<'_, '_>, points: Points<'_, Self>) -> Self::Condition;
     /// Outputs of points of `n` states each.
     fn observe(call: Call<'_, '_>, n: usize, points: &[Self], outputs: &mut [Self]);
     /// Noise levels; both come with any numbers.
@@ -42,23 +42,9 @@ impl Buffers {
     }
 }
 
-/// Points to be carried; see [`Points`].
-pub(super) struct MovingPoints<'w, N> {
-    pub all: &'w mut [N],
-    pub moving: usize,
-    pub limits: &'w [Interval],
-    pub shifts: &'w [N],
-}
-
 impl FilterNumber for f64 {
     #[inline(always)]
-    fn advance(call: Call<'_, '_>, points: MovingPoints<'_, Self>) -> bool {
-        let points = Points {
-            all: points.all,
-            moving: points.moving,
-            limits: points.limits,
-            shifts: points.shifts,
-        };
+    fn advance(call: Call<'_, '_>, points: Points<'_, Self>) -> bool {
         (call.twin).advance(&call.now[0], points, &mut call.buffers.work)
     }
     #[inline(always)]
@@ -80,16 +66,9 @@ impl FilterNumber for f64 {
 /// One output.
 impl FilterNumber for Lanes {
     #[inline(always)]
-    fn advance(call: Call<'_, '_>, points: MovingPoints<'_, Self>) -> Mask {
+    fn advance(call: Call<'_, '_>, points: Points<'_, Self>) -> Mask {
         let Buffers { work, one, shift } = call.buffers;
-        let points = LanePoints {
-            all: points.all,
-            limits: points.limits,
-            shifts: points.shifts,
-            one,
-            shift,
-        };
-        let bent = call.twin.advance_lanes(call.now, points, work);
+        let bent = (call.twin).advance_lanes(call.now, points, (one, shift), work);
         Mask::of(|lane| bent[lane])
     }
     #[inline(always)]

@@ -24,31 +24,24 @@ pub struct ComposedBlackBox {
 debug_by_name!(ComposedBlackBox);
 
 /// Outputs of a run, its noise apart where this is known.
-enum Outputs {
-    Known(KnownNoise),
-    Drawn(Signal),
+struct Outputs {
+    /// Signal behind which noise of the sensors enters.
+    signal: Signal,
+    known: Option<Vec<NoisePart>>,
 }
 
 impl Outputs {
-    /// Signal behind which noise of the sensors enters.
-    fn signal(&mut self) -> &mut Signal {
-        match self {
-            Self::Known(known) => &mut known.mean,
-            Self::Drawn(signal) => signal,
-        }
-    }
-
-    fn drawn(self, noise: Noise) -> Signal {
-        match self {
-            Self::Known(known) => known.draw(noise),
-            Self::Drawn(signal) => signal,
+    /// Adds draws of the known noise to the signal.
+    fn draw(&mut self, noise: Noise) {
+        for part in self.known.take().into_iter().flatten() {
+            part.add(noise, &mut self.signal);
         }
     }
 
     fn add(&mut self, part: NoisePart, noise: Noise) {
-        match self {
-            Self::Known(known) => known.parts.push(part),
-            Self::Drawn(signal) => part.add(noise, signal),
+        match &mut self.known {
+            Some(parts) => parts.push(part),
+            None => part.add(noise, &mut self.signal),
         }
     }
 }
@@ -115,12 +108,9 @@ impl ComposedBlackBox {
             return Ok(None);
         }
         let theta = self.checked(theta, drive.dt())?;
-        Ok(
-            match self.outputs(&self.parts.list, &theta, drive, Noise::OFF)? {
-                Outputs::Known(known) => Some(known),
-                Outputs::Drawn(_) => None,
-            },
-        )
+        let outputs = self.outputs(&self.parts.list, &theta, drive, Noise::OFF)?;
+        let mean = outputs.signal;
+        Ok(outputs.known.map(|parts| KnownNoise { mean, parts }))
     }
 
     /// Outputs behind these parts, θ all of it.
@@ -133,7 +123,9 @@ impl ComposedBlackBox {
     ) -> Result<Outputs, SimulationError> {
         let Some((Added { part, .. }, inside)) = parts.split_last() else {
             let own = &theta[..self.parts.parameters];
-            return Ok(Outputs::Drawn(self.own.simulate(own, drive, noise)?));
+            let signal = self.own.simulate(own, drive, noise)?;
+            let known = None;
+            return Ok(Outputs { signal, known });
         };
         let inner = |theta: &[f64], drive: &Drive| self.outputs(inside, theta, drive, noise);
         match part {
@@ -158,13 +150,14 @@ impl ComposedBlackBox {
             }
             TwinPart::White(white) if white.is_silent => {
                 let run = || {
-                    let silent = self.outputs(inside, theta, drive, Noise::OFF)?;
-                    Ok(silent.drawn(Noise::OFF))
+                    let mut silent = self.outputs(inside, theta, drive, Noise::OFF)?;
+                    silent.draw(Noise::OFF);
+                    Ok(silent.signal)
                 };
-                return Ok(Outputs::Known(KnownNoise {
-                    mean: white.run(theta, drive, run)?,
-                    parts: white.parts(theta).collect(),
-                }));
+                return Ok(Outputs {
+                    signal: white.run(theta, drive, run)?,
+                    known: Some(white.parts(theta).collect()),
+                });
             }
             _ => {}
         }
@@ -172,18 +165,18 @@ impl ComposedBlackBox {
         match part {
             TwinPart::Law(part) => {
                 if part.is_behind_noise() {
-                    outputs = Outputs::Drawn(outputs.drawn(noise));
+                    outputs.draw(noise);
                 }
                 match &part.law {
                     Law::Sensor(law) | Law::Reading(law) => {
-                        part.pass(law.as_ref(), theta, drive, outputs.signal());
+                        part.pass(law.as_ref(), theta, drive, &mut outputs.signal);
                     }
                     Law::MeasurementNoise(law) => {
                         let source = format!("sensor-noise/{}", part.target);
                         let level = law(part.m(theta));
                         outputs.add(NoisePart::white(part.target, level, source), noise);
                     }
-                    _ => part.finish(theta, noise, outputs.signal()),
+                    _ => part.finish(theta, noise, &mut outputs.signal),
                 }
             }
             TwinPart::White(white) => white.parts(theta).for_each(|part| outputs.add(part, noise)),
@@ -229,9 +222,8 @@ impl ComposedBlackBox {
         if half <= f64::EPSILON {
             return Ok(outputs);
         }
-        let (mut first, mut last) = (at(low)?, at(high)?);
-        let (first, last) = (first.signal(), last.signal());
-        for ((k, v), mut row) in by.iter().enumerate().zip(outputs.signal().rows_mut()) {
+        let (first, last) = (at(low)?.signal, at(high)?.signal);
+        for ((k, v), mut row) in by.iter().enumerate().zip(outputs.signal.rows_mut()) {
             let x = (v - middle) / half;
             let ends = first.row(k).into_iter().zip(last.row(k));
             for (y, (a, b)) in row.iter_mut().zip(ends) {
@@ -269,9 +261,9 @@ impl DigitalTwin for ComposedBlackBox {
     ) -> Result<Signal, SimulationError> {
         self.parts.call_hooks()?;
         let theta = self.checked(theta, drive.dt())?;
-        Ok(self
-            .outputs(&self.parts.list, &theta, drive, noise)?
-            .drawn(noise))
+        let mut outputs = self.outputs(&self.parts.list, &theta, drive, noise)?;
+        outputs.draw(noise);
+        Ok(outputs.signal)
     }
     fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
         if self.parts.list.is_empty() {

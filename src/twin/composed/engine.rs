@@ -6,7 +6,7 @@ use crate::math::{LANES, Lanes};
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::integrator::felt;
 use crate::twin::points::{
-    LanePoints, Layout, Points, advance_one_by_one, lanes_one_by_one, noise_lanes, observe_lanes,
+    Layout, Points, advance_one_by_one, lanes_one_by_one, noise_lanes, observe_lanes,
     readout_lanes, readout_one_by_one,
 };
 use crate::twin::{
@@ -37,11 +37,12 @@ pub(crate) trait Engine: StateSpace {
     /// Carries the points of a filter over a step; returns whether a constraint acted on any that matters to the noise.
     fn advance_points(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool;
 
-    /// As [`advance_points`](Self::advance_points) for several filters, one a lane.
+    /// As [`advance_points`](Self::advance_points) for several filters, one a lane; `one` holds points and shifts of one of them.
     fn advance_lanes(
         &self,
         now: &[Now<'_>],
-        points: LanePoints<'_>,
+        points: Points<'_, Lanes>,
+        one: (&mut [f64], &mut [f64]),
         work: &mut Workspace,
     ) -> [bool; LANES];
 
@@ -114,15 +115,16 @@ impl<T: StateSpace> Engine for T {
     fn advance_lanes(
         &self,
         now: &[Now<'_>],
-        points: LanePoints<'_>,
+        points: Points<'_, Lanes>,
+        one: (&mut [f64], &mut [f64]),
         work: &mut Workspace,
     ) -> [bool; LANES] {
         let advance = |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
         match points.shifts.len() {
-            1 => lanes_one_by_one(1, now, points, advance),
-            2 => lanes_one_by_one(2, now, points, advance),
-            3 => lanes_one_by_one(3, now, points, advance),
-            n => lanes_one_by_one(n, now, points, advance),
+            1 => lanes_one_by_one(1, now, points, one, advance),
+            2 => lanes_one_by_one(2, now, points, one, advance),
+            3 => lanes_one_by_one(3, now, points, one, advance),
+            n => lanes_one_by_one(n, now, points, one, advance),
         }
     }
 
@@ -219,7 +221,7 @@ fn step<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Worksp
     // One call of the drift, compiled inline, for what most twins do.
     if work.is_plain() {
         let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| twin.drift(now, x, dx);
-        return Integrator::Euler.step(now, x, work, drift);
+        return Integrator::Euler.step(now, x, work.stages(), drift);
     }
     carry(twin, now, x, work);
 }

@@ -58,15 +58,6 @@ impl NoisePart {
     }
 }
 
-impl KnownNoise {
-    /// A run: the mean with these draws on it.
-    pub(crate) fn draw(self, noise: Noise) -> Signal {
-        let mut outputs = self.mean;
-        (self.parts.iter()).for_each(|part| part.add(noise, &mut outputs));
-        outputs
-    }
-}
-
 /// Noise level of an output.
 #[derive(Debug, Clone)]
 pub(crate) struct WhiteLevel {

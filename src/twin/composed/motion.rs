@@ -4,8 +4,7 @@ use super::parts::Theta;
 use super::{Composed, Entry, Law, TwinPart};
 use crate::math::{LANES, Lanes};
 use crate::twin::points::{
-    LanePoints, Layout, Points, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes,
-    shifted_value,
+    Layout, Points, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes, shifted_value,
 };
 use crate::twin::{Now, Workspace};
 
@@ -203,18 +202,19 @@ impl Composed {
         bent
     }
 
-    /// As [`advance`](Self::advance), of several filters, one a lane.
+    /// As [`advance`](Self::advance), of several filters, one a lane; `one` holds points and shifts of one of them.
     pub(crate) fn advance_lanes(
         &self,
         now: &[Now<'_>],
-        points: LanePoints<'_>,
+        points: Points<'_, Lanes>,
+        one: (&mut [f64], &mut [f64]),
         work: &mut Workspace,
     ) -> [bool; LANES] {
         if self.parts.acts.leave_motion() {
-            return self.lanes_alone(now, |now| self.own.advance_lanes(now, points, work));
+            return self.lanes_alone(now, |now| self.own.advance_lanes(now, points, one, work));
         }
         let advance = |now: &Now<'_>, points: Points<'_>| self.advance(now, points, work);
-        lanes_one_by_one(points.shifts.len(), now, points, advance)
+        lanes_one_by_one(points.shifts.len(), now, points, one, advance)
     }
 
     /// One output of the points, `n` states each, of several filters, one a lane; `buffer` holds those of one of them.

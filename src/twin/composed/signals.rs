@@ -5,6 +5,7 @@ use super::{Composed, Disturbance, Entry, Law, LawPart, LawPlace, SignalChange, 
 use crate::record::{Drive, RecordError, Signal};
 use crate::twin::points::Layout;
 use crate::twin::{Now, SimulationError};
+use smallvec::SmallVec;
 
 /// Outputs of points that are kept on the stack.
 const SHORT: usize = 16;
@@ -74,13 +75,7 @@ impl Composed {
     /// Advances the memories of sensors, so many points at once that their outputs need no heap.
     pub(super) fn remember_signals(&self, now: &Now<'_>, x: &mut [f64]) {
         let (n, p) = (self.states(), self.outputs());
-        let mut outputs = [0.0; SHORT];
-        let mut heap = vec![0.0; if p > SHORT { p } else { 0 }];
-        let y = if p > SHORT {
-            &mut heap
-        } else {
-            &mut outputs[..]
-        };
+        let mut y = SmallVec::<[f64; SHORT]>::from_elem(0.0, SHORT.max(p));
         for x in x.chunks_mut(SHORT / p.min(SHORT) * n) {
             let y = &mut y[..x.len() / n * p];
             self.own_outputs(now, x, y);
