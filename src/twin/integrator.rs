@@ -120,7 +120,7 @@ pub enum Integrator {
 /// Buffers of one twin that outlive a step, so that the loop allocates nothing.
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
-    stages: Stages,
+    stages: StepBuffers,
     integrator: Integrator,
     /// Substeps and lines of inputs; `None` where a sample is one step and inputs are held.
     refined: Option<Refined>,
@@ -128,7 +128,7 @@ pub(crate) struct Workspace {
 
 /// Buffers of a step.
 #[derive(Debug, Clone)]
-pub(super) struct Stages {
+pub(super) struct StepBuffers {
     slopes: [Vec<f64>; 4],
     stage: Vec<f64>,
 }
@@ -151,7 +151,7 @@ impl Workspace {
         (integrator, stepping): (Integrator, Stepping),
     ) -> Self {
         Self {
-            stages: Stages::of(limits.len()),
+            stages: StepBuffers::of(limits.len()),
             integrator,
             refined: (stepping != Stepping::default()).then(|| Refined {
                 substeps: stepping.substeps.max(1),
@@ -169,7 +169,7 @@ impl Workspace {
 
     /// Buffers of a single step.
     #[inline]
-    pub(super) fn stages(&mut self) -> &mut Stages {
+    pub(super) fn stages(&mut self) -> &mut StepBuffers {
         &mut self.stages
     }
 
@@ -195,7 +195,7 @@ impl Workspace {
     }
 }
 
-impl Stages {
+impl StepBuffers {
     /// For `states` states.
     fn of(states: usize) -> Self {
         Self {
@@ -229,7 +229,7 @@ impl Integrator {
         self,
         now: &Now<'_>,
         x: &mut [f64],
-        work: &mut Stages,
+        work: &mut StepBuffers,
         mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
         self.step_in_stages(now, x, work, |_, now, x, dx| drift(now, x, dx));
@@ -243,7 +243,7 @@ impl Integrator {
         n: usize,
         now: &Now<'_>,
         x: &mut [f64],
-        (work, refined): (&mut Stages, &mut Refined),
+        (work, refined): (&mut StepBuffers, &mut Refined),
         mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
         let m = refined.substeps;
@@ -288,7 +288,7 @@ impl Integrator {
         self,
         now: &Now<'_>,
         x: &mut [f64],
-        work: &mut Stages,
+        work: &mut StepBuffers,
         mut drift: impl FnMut(f64, &Now<'_>, &[f64], &mut [f64]),
     ) {
         let dt = now.dt;
@@ -344,7 +344,7 @@ mod tests {
 
     /// Global error of ẋ = −x + t at t = 1, whose solution is 2e^{−t} + t − 1.
     fn error(integrator: Integrator, steps: usize) -> f64 {
-        let (dt, mut x, mut work) = (1.0 / steps as f64, [1.0], Stages::of(1));
+        let (dt, mut x, mut work) = (1.0 / steps as f64, [1.0], StepBuffers::of(1));
         for k in 0..steps {
             let now = Now::new(k as f64 * dt, dt, &[], &[]);
             integrator.step(&now, &mut x, &mut work, |now, x, dx| dx[0] = now.t - x[0]);
