@@ -100,10 +100,10 @@ fn noise(file: &StudyFile, outline: &Outline) -> Option<BTreeMap<String, NoiseLe
     let scaled = |(name, level): (&String, &NoiseLevel)| {
         let is_output = outline.outputs.iter().any(|output| output.name == *name);
         let mut level = *level;
-        let NoiseLevel::Declared { std, .. } = &mut level else {
+        let NoiseLevel::Declared(declared) = &mut level else {
             return None;
         };
-        *std *= if is_output { FACTOR } else { 1.0 };
+        declared.std *= if is_output { FACTOR } else { 1.0 };
         Some((name.clone(), level))
     };
     file.noise.iter().map(scaled).collect()
