@@ -73,10 +73,9 @@ fn answer(case: &Case) -> Answer {
     if case.asks == Asks::Fit {
         let fit = case.study.fit(&case.records).unwrap();
         let mut figures = vec![("log_likelihood".to_owned(), fit.log_likelihood)];
-        figures.extend(
-            fit.evidence
-                .map(|e| ("log_evidence".to_owned(), e.log_evidence)),
-        );
+        // With too few draws the evidence is Laplace's, up to a nat from what draws say.
+        let drawn = fit.evidence.filter(|e| e.std_error.is_some());
+        figures.extend(drawn.map(|e| ("log_evidence".to_owned(), e.log_evidence)));
         return (figures, vec![]);
     }
     let settings = DiagnoseSettings {

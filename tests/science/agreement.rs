@@ -23,7 +23,7 @@ fn a_fit_and_a_diagnosis_weigh_an_effect_alike() {
         &tanks,
         "sensor-bias",
         "sensor",
-        &[2.0],
+        &[4.0],
         &[0.6, 0.5, 0.55, 1.0],
     );
     let all: Vec<String> = tanks.effects().iter().map(|e| e.id().to_owned()).collect();

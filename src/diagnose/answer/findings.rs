@@ -88,13 +88,13 @@ fn holds(function: &Term, effect: &Term) -> bool {
     if function.nature == Nature::Past {
         return has_memory;
     }
+    // Every function contains a constant.
+    if law.id().ends_with("-bias") || law.id() == "constant-forcing" {
+        return !function.variables.is_empty();
+    }
     let [(variable, ..)] = function.variables.as_slice() else {
         return false;
     };
-    // Every function contains a constant.
-    if law.id().ends_with("-bias") || law.id() == "constant-forcing" {
-        return true;
-    }
     let of_time = variable == "t";
     match law.law().target() {
         TargetKind::State if law.id() == "periodic-disturbance" => of_time,

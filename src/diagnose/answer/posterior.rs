@@ -7,7 +7,8 @@
 //! ```
 //!
 //! An unknown function beside a set leaves it a part of the explanation if it adds less than a third; otherwise the set imitates an unknown law,
-//! and its mass is that of the unknown. An unknown function alone is a listed effect in another form as far as it is no better than an effect
+//! and its mass is that of the unknown. An effect that the function holds, as every function holds a constant, belongs to the set where
+//! that explains more with it. An unknown function alone is a listed effect in another form as far as it is no better than an effect
 //! of its own variable, at its place. What it explains more is something unknown beside the effect, if that is 15 % at most.
 
 use crate::diagnose::outcome::Probabilities;
@@ -149,6 +150,21 @@ impl Hypotheses {
             && (own > (1.0 - Thresholds::OUTDONE) * best_function || stands_alone)
     }
 
+    /// The set beside which a function stands once effects that it holds in another form are told apart from it: the best known one.
+    fn with_held<'s>(&'s self, set: &'s Set, function: &Function) -> &'s Set {
+        let price = self.price();
+        let own = |set: &Set| set.log_z - price.of(set.keys.len());
+        let is_whole = |other: &&Set| {
+            let is_told = |key| set.keys.contains(key) || function.holds.contains(key);
+            set.keys.iter().all(|key| other.keys.contains(key)) && other.keys.iter().all(is_told)
+        };
+        let all = self.sets.iter().filter(is_whole);
+        all.fold(set, |best, other| match own(other) > own(best) {
+            true => other,
+            false => best,
+        })
+    }
+
     /// The effects that a function holds in another form, with the share of its mass that is theirs; and whether they explain nearly all that
     /// it does, so that the rest of it is something unknown beside them.
     fn held_by<'s>(&'s self, function: &'s Function) -> (Vec<(&'s str, f64)>, bool) {
@@ -196,6 +212,7 @@ impl Hypotheses {
             sums.function(function, mass(*log_weight), &held, leaves_rest);
         }
         for (set, function, log_weight) in &beside {
+            let set = self.with_held(set, function);
             let is_part = self.is_part(set, function);
             sums.beside(set, function, mass(log_weight - price.fine_print), is_part);
         }

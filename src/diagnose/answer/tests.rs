@@ -333,6 +333,27 @@ fn what_is_beside_one_effect_is_not_credited_to_a_pair() {
     assert!(answer.posterior.name(second) > 0.9);
 }
 
+/// A constant force that a function beside friction holds belongs to the pair, where friction with it explains far more than alone; a function
+/// that holds nothing leaves friction the imitation of an unknown law.
+#[test]
+fn what_a_function_holds_is_told_apart_from_it() {
+    let (friction, force) = (KEYS[0], KEYS[4]);
+    let answer = |holds: &[&str]| {
+        let both = Set {
+            keys: vec![friction.into(), force.into()],
+            ..set(friction, 1100.0, Some(1515.0))
+        };
+        let mut alone = set(friction, 700.0, Some(1510.0));
+        let beside = &mut alone.beside.as_mut().unwrap()[0];
+        beside.holds = holds.iter().map(|key| (*key).to_owned()).collect();
+        weighed(vec![alone, set(force, 50.0, None), both], vec![])
+    };
+    let told = answer(&[force]);
+    assert_eq!(told.decision, Decision::Partial);
+    assert_eq!(told.accepted, [friction, force]);
+    assert_eq!(answer(&[]).decision, Decision::NoneOfThese);
+}
+
 #[test]
 fn near_rivals_are_a_class_and_a_clear_lead_is_a_name() {
     let decided = |lead: f64| {
