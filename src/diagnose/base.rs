@@ -6,10 +6,9 @@ use super::step::FinerStep;
 use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::climb::{climb, fit};
-use crate::fit::fits;
 use crate::fit::growing::base_fit;
-use crate::fit::passes::Passes;
 use crate::fit::problem::Problem;
+use crate::fit::{ITERATIONS, Passes, fits};
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::search::frequencies::frequencies;
@@ -21,9 +20,6 @@ use crate::record::Record;
 use crate::study::{Study, StudyError};
 use crate::twin::{Noise, Role, Twin};
 use std::sync::Arc;
-
-/// Iterations of a search: loud noise has a way to go.
-const ITERATIONS: usize = 80;
 
 /// The fitted twin and the units of its records.
 pub(in crate::diagnose) struct Base {

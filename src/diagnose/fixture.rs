@@ -3,7 +3,7 @@
 use super::base::Base;
 use super::settings::DiagnoseSettings;
 use crate::effect::{Catalogue, augment};
-use crate::fit::passes::Passes;
+use crate::fit::Passes;
 use crate::hypothesis::term::Term;
 use crate::record::Record;
 use crate::study::{RecordPlan, Study};

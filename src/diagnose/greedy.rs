@@ -3,7 +3,7 @@
 use super::base::Base;
 use super::settings::{Ablation, DiagnoseSettings};
 use crate::effect::EffectPattern;
-use crate::fit::passes::Passes;
+use crate::fit::Passes;
 use crate::hypothesis::search::{Before, Breadth, listed};
 use crate::record::Record;
 use crate::study::{Study, StudyError};

@@ -126,7 +126,7 @@ mod tests {
     use crate::diagnose::base::Base;
     use crate::diagnose::fixture::{self, tanks};
     use crate::diagnose::{DiagnoseSettings, Verdict, diagnose};
-    use crate::fit::passes::Passes;
+    use crate::fit::Passes;
     use crate::progress::Progress;
     use crate::record::Record;
     use crate::study::Study;

@@ -6,7 +6,7 @@ use super::quantify::share::{Measures, shrinkage};
 use super::settings::DiagnoseSettings;
 use super::step::finer_step;
 use super::thresholds::Thresholds;
-use crate::fit::passes::Passes;
+use crate::fit::Passes;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::search::{Before, Breadth, listed};
 use crate::record::Record;

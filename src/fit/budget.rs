@@ -1,5 +1,11 @@
 //! Budget of a fit: its cost, and the tolerances at which it ends.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Iterations of each search: loud noise has a way to go.
+pub(crate) const ITERATIONS: usize = 80;
+
 /// Budget of a fit.
 #[derive(Debug)]
 pub(super) struct FitBudget {
@@ -133,3 +139,17 @@ pub(super) const BUDGET: FitBudget = FitBudget {
     evidence_rounds: 4,
     effective_draws: 30.0,
 };
+
+/// Passes over a record, of a filter or of an ensemble of simulations, with or without derivatives. Clones share the count.
+#[derive(Clone, Default)]
+pub(crate) struct Passes(Arc<AtomicU64>);
+
+impl Passes {
+    pub fn count(&self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub fn so_far(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}

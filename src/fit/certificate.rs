@@ -2,9 +2,8 @@
 
 use super::climb::Fitted;
 use super::problem::Problem;
-use super::searched::ITERATIONS;
 use super::starts::{agreeing, climbs, polish, sort};
-use crate::fit::budget::BUDGET;
+use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 

@@ -8,9 +8,8 @@
 use super::certificate::Certificate;
 use super::climb::{Fitted, climb};
 use super::problem::Problem;
-use super::searched::ITERATIONS;
 use super::solver::evaluation_error;
-use crate::fit::budget::BUDGET;
+use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use argmin::core::{CostFunction, Executor, IterState};
 use argmin::solver::neldermead::NelderMead;

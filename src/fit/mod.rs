@@ -7,12 +7,11 @@
 //! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
 //! | `score.rs` | how well a fit predicts a record that it has not seen |
 //! | `follow.rs` | how the fitted twin follows its records |
-//! | `budget.rs` | cost and tolerances of a fit |
+//! | `budget.rs` | cost and tolerances of a fit, and the count of its passes |
 //! | `starts.rs`, `spectral.rs`, `growing.rs` | where does a search begin |
 //! | `solver.rs` | the one solver, on argmin |
 //! | `climb.rs`, `kinks.rs` | the most probable θ, also where the likelihood has kinks |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
-//! | `passes.rs` | what a search costs |
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `reference.rs` | linear gain of a direction beside θ |
 //! | `doubts.rs` | reasons to doubt a result, in one list |
@@ -30,7 +29,6 @@ pub(crate) mod growing;
 mod kinks;
 pub(crate) mod least_squares;
 mod outcome;
-pub(crate) mod passes;
 pub(crate) mod posterior;
 pub(crate) mod problem;
 pub(crate) mod reference;
@@ -41,6 +39,7 @@ mod solver;
 mod spectral;
 pub(crate) mod starts;
 
+pub(crate) use budget::{ITERATIONS, Passes};
 pub use certificate::Side;
 pub(crate) use outcome::NOT_CONVERGED;
 pub use outcome::{

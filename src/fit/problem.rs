@@ -1,7 +1,7 @@
 //! A twin and the records that it is fitted to.
 
 use crate::fit::axis::{Axis, EvidencePrior, Family};
-use crate::fit::passes::Passes;
+use crate::fit::budget::Passes;
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, States};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};

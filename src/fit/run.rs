@@ -10,9 +10,9 @@ use super::outcome::{
 };
 use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
 use super::problem::Problem;
-use super::searched::{ITERATIONS, Searched};
+use super::searched::Searched;
 use super::starts::polish;
-use crate::fit::budget::BUDGET;
+use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, Measured};
 use crate::math::deviation;

@@ -1,5 +1,6 @@
 //! The searches of a fit, and where they ended.
 
+use super::budget::ITERATIONS;
 use super::climb::Fitted;
 use super::growing::base_fit;
 use super::kinks::over_kinks;
@@ -9,9 +10,6 @@ use super::starts::{Care, polish, search};
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use std::collections::BTreeMap;
-
-/// Iterations of each search: loud noise has a way to go.
-pub(crate) const ITERATIONS: usize = 80;
 
 /// Ends of all searches.
 pub(crate) struct Searched {

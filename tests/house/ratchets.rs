@@ -276,24 +276,24 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     let files = sources.sources.values();
     let files = files.map(|source| source.file.display().to_string());
     vec![
-        Ratchet::new("public items", 153, items.collect()),
+        Ratchet::new("public items", 152, items.collect()),
         Ratchet::new("error types", 13, errors),
-        Ratchet::new("lines of code", 48_950, lines),
-        Ratchet::new("files", 426, files.collect()),
-        Ratchet::new("hidden items", 3, hidden(sources)),
+        Ratchet::new("lines of code", 48_690, lines),
+        Ratchet::new("files", 413, files.collect()),
+        Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 409, constants(sources)),
+        Ratchet::new("named numeric constants", 406, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
-            6,
+            4,
             wide_functions(sources, 6),
         ),
         Ratchet::new(
             "functions of more than 100 lines",
-            2,
+            1,
             long_functions(sources, 100),
         ),
-        Ratchet::new("further types of one name", 32, repeated_types(sources)),
+        Ratchet::new("further types of one name", 24, repeated_types(sources)),
         Ratchet::new(
             "library messages with words of the command line",
             1,

@@ -9,7 +9,7 @@ use crate::diagnose::prior::inside;
 use crate::diagnose::settings::{Ablation, DiagnoseSettings};
 use crate::diagnose::step::{FinerStep, finer_step};
 use crate::diagnose::thresholds::Thresholds;
-use crate::fit::passes::Passes;
+use crate::fit::Passes;
 use crate::hypothesis::noise::kinds;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::search::explanation::Explanation;
@@ -366,7 +366,7 @@ impl Evidence for Setup<'_> {
     }
 }
 
-/// What is known that bears on a question: θ of the sets that it names, and fits of its own terms.
+/// Knowledge that bears on a question: θ of the sets that it names, and fits of its own terms.
 fn before(question: &Question, terms: &[Arc<Term>], known: &Explanations) -> Before {
     let keys: BTreeSet<String> = terms.iter().map(|term| term.key()).collect();
     let fit = |key: String| {
