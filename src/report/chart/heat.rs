@@ -56,7 +56,7 @@ pub fn heat_map(title: &str, description: &str, groups: &[HeatGroup]) -> String 
         canvas.text((x, y + LINE - 1.0), "middle", false, &label);
     }
     let at = (0.5 * (left + right), y + 2.0 * LINE);
-    canvas.text(at, "middle", false, &"t in s");
+    canvas.text(at, "middle", false, "t in s");
     canvas.svg(y + 2.0 * LINE + EDGE)
 }
 
