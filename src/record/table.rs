@@ -291,15 +291,17 @@ fn channels(names: &[&str]) -> Result<(usize, usize), String> {
     let (inputs, outputs) = (count('u'), count('y'));
     let expected = columns(inputs, outputs);
     let rename = format!("rename the columns to {}", excerpt(&expected.join(",")));
-    for (j, name) in names.iter().enumerate() {
-        let is_repeated = names[..j].contains(name);
+    if names.iter().filter(|name| **name == "t").count() > 1 {
+        return Err("column t appears twice; remove one".into());
+    }
+    for name in names {
+        let is_repeated = names.iter().filter(|other| *other == name).count() > 1;
         let is_expected = match *name {
             "u1" if inputs == 1 => true,
             "y1" if outputs == 1 => true,
             name => expected.iter().any(|e| e == name),
         };
         let problem = match *name {
-            "t" if is_repeated => "appears twice; remove one",
             _ if is_repeated => &format!("appears twice; {rename}"),
             name if !is_usual(name) => {
                 "is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,…, and remove others"

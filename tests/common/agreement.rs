@@ -108,11 +108,11 @@ pub(crate) fn compared(study: &Study, record: &Record, without: &[&str]) -> Vec<
 
 /// Nats from the best effect within which another may still be what is missing.
 const CANDIDATES: f64 = 6.0;
-/// Nats that a diagnosis credits a fit with that it gave up before its end.
-const CREDIT: f64 = 1.5;
+/// Nats by which a diagnosis may say more of another: 1.5 that it credits a fit with that it gave up before its end, and one by which its fit
+/// of the twin alone may be short.
+const GIVEN_UP: f64 = 2.5;
 
-/// Effects that may be what is missing and of which both do not say the same, and others of which a diagnosis says more than its credit
-/// allows.
+/// Effects that may be what is missing and of which both do not say the same, and others of which a diagnosis says too much.
 pub(crate) fn differing(name: &str, all: &[Compared]) -> Vec<String> {
     for c in all {
         let Compared {
@@ -128,7 +128,7 @@ pub(crate) fn differing(name: &str, all: &[Compared]) -> Vec<String> {
     }
     (all.iter())
         .filter(|c| {
-            let least = if c.is_candidate { -0.5 } else { -0.5 - CREDIT };
+            let least = if c.is_candidate { -0.5 } else { -GIVEN_UP };
             let most = if c.is_candidate { 0.5 } else { f64::INFINITY };
             let difference = c.fitted - c.diagnosed;
             c.diagnosed > 1.0 && !(least..=most).contains(&difference)

@@ -12,6 +12,8 @@ use truetwin::study::StudyFile;
 
 /// Nats by which an answer may lie below its golden value.
 const BELOW: f64 = 0.1;
+/// The same of a fit that had not converged then: with other seeds, that commit ended 2 nats apart on the tanks and 67 on the carriage.
+const BELOW_UNCONVERGED: f64 = 3.0;
 
 /// What is asked of a record, under the name of its golden answer.
 pub(crate) struct Case {
@@ -52,7 +54,11 @@ pub(crate) fn worse(cases: &[Case]) -> Vec<String> {
                 continue;
             };
             line += &format!("; {key} {:+.3}", value - before);
-            if value.is_nan() || value <= before - BELOW {
+            let below = match expected["converged"] == false {
+                true => BELOW_UNCONVERGED,
+                false => BELOW,
+            };
+            if value.is_nan() || value <= before - below {
                 worse.push(format!("{}: {key} {before:.3} -> {value:.3}", case.name));
             }
         }
