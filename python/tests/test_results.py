@@ -27,7 +27,7 @@ def test_a_fit_recovers_the_parameters(twin, csv):
     assert low < fit.parameters["tau"] < high and fit.level == 0.9
     assert fit.converged and fit.warnings == () and fit.at_bound == ()
     assert fit.raw["schema"] == "truetwin.fit/1"
-    assert str(fit).startswith("heater: fitted to 100 samples.")
+    assert str(fit).startswith("2 parameters fitted to 100 samples:")
     with pytest.raises(dataclasses.FrozenInstanceError):
         fit.level = 0.5
 
@@ -192,7 +192,7 @@ def test_trials_are_scored():
 def test_reports_show_in_notebooks(twin, csv, tmp_path):
     fit = twin.fit(csv)
     shown = fit.report._repr_html_()
-    assert shown.startswith("<svg") and "<pre>heater: fitted" in shown
+    assert shown.startswith("<svg") and "<pre>2 parameters fitted" in shown
     diagnosis = twin.diagnose(csv, out=tmp_path / "gap")
     shown = diagnosis._repr_html_()
     # The page is data of one attribute: nothing of it ends the attribute early.
