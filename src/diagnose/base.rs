@@ -34,6 +34,8 @@ pub(in crate::diagnose) struct Base {
     pub is_silent: bool,
     /// Kinds of noise that the records asked for.
     pub noises: Vec<Arc<Term>>,
+    /// Nats of evidence that these kinds gained.
+    pub noise_gain: f64,
     /// The finer step that the records asked for.
     pub step: Option<FinerStep>,
 }
@@ -115,7 +117,9 @@ impl Base {
             return Ok(None);
         };
         let noises = self.noises.iter().chain(&found.terms).cloned().collect();
-        self.carried_on(model, noises).map(Some)
+        let noise_gain = self.noise_gain + found.log_evidence - self.model.log_evidence;
+        let base = self.carried_on(model, noises)?;
+        Ok(Some(Base { noise_gain, ..base }))
     }
 
     /// The twin fitted again from other θ; `None` where that is no better.
@@ -168,6 +172,7 @@ impl Base {
             noisy: self.noisy.clone(),
             is_silent: self.is_silent,
             noises,
+            noise_gain: self.noise_gain,
             step: self.step,
             ..Base::of(model)?
         })
@@ -183,6 +188,7 @@ impl Base {
             noisy: vec![],
             is_silent: false,
             noises: vec![],
+            noise_gain: 0.0,
             step: None,
             theta,
             model,

@@ -12,6 +12,7 @@
 //! | `answer/` | the answer: posterior of what was found, decision, names, places |
 //! | `residuals/` | innovations cut by time, state, lag and frequency |
 //! | `locate/` | where: places, missing functions, maps of the residuals |
+//! | `predictive/` | do records that the fitted twin simulates look like the measured ones |
 //! | `quantify/` | how far: share closed, smallest visible effect, next input, calibration |
 //! | `outcome/` | results |
 //!
@@ -26,6 +27,7 @@ pub(crate) mod fixture;
 mod greedy;
 mod locate;
 mod outcome;
+mod predictive;
 mod price;
 mod prior;
 mod quantify;
@@ -41,9 +43,10 @@ mod true_effects;
 pub(crate) use greedy::greedy;
 pub(crate) use outcome::Cell;
 pub use outcome::{
-    Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,
-    FreeRuns, Horizon, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities,
-    Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
+    Band, Burst, Cause, Channel, Decision, Detection, Diagnosis, Discovery, Disturbance, EffectFit,
+    FittedParameter, FreeRuns, Horizon, Lag, Location, Maps, MissingFunction, NextInput, Onset,
+    Predicted, PredictiveCheck, Probabilities, Region, Remains, Shrinkage, TargetShare, Term, Verdict,
+    Visible, Window,
 };
 pub(crate) use quantify::share::SHORTEST_SPLIT;
 pub use run::diagnose;

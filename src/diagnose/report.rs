@@ -8,6 +8,7 @@ use super::locate::discover::discover;
 use super::locate::functions::{curve, missing_functions};
 use super::locate::maps::maps;
 use super::outcome::*;
+use super::predictive::{Predictive, declared};
 use super::prior::{absorbing, left_the_prior};
 use super::quantify::calibrate::{calibrate, p_value};
 use super::quantify::free_run::{Runner, free_runs, root};
@@ -17,6 +18,7 @@ use super::quantify::share::{Measures, shrinkage};
 use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
+use crate::fit::posterior::{PosteriorSample, posterior};
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::set::TermSet;
@@ -50,6 +52,7 @@ impl Report<'_> {
         let (settings, records) = (self.watch.settings, &base.model.problem.records);
         let detection = self.detection()?;
         let (answer, absorbed) = self.answer()?;
+        let (answer, check) = self.checked(answer)?;
         let accepted = self.accepted(&answer).and_then(|e| e.model.as_ref());
         let accepted = accepted.map(finished).transpose()?;
         let accepted = accepted.as_ref();
@@ -70,6 +73,7 @@ impl Report<'_> {
             twin: self.study.name().into(),
             verdict: answer.verdict,
             detection,
+            check,
             warnings: warnings(
                 self.study.twin(),
                 records,
@@ -203,6 +207,41 @@ impl Report<'_> {
             answer = answer.refuted();
         }
         Ok((answer, explained))
+    }
+
+    /// The answer once an all-clear has been checked: fitted noise may have swallowed what is missing.
+    fn checked(&self, answer: Answer) -> Result<(Answer, Option<PredictiveCheck>), StudyError> {
+        let settings = self.watch.settings;
+        let is_clear = answer.verdict != Verdict::StructuralGap;
+        if !is_clear || settings.detection_only || self.found.is_partial {
+            return Ok((answer, None));
+        }
+        let model = &self.found.evidence.base.model;
+        let noise = settings.noise().child("check");
+        let fitted = std::slice::from_ref(&model.fitted);
+        let draws = match model.problem.is_simulated() {
+            true => PosteriorSample::default(),
+            false => posterior(&model.problem, fitted, None, noise.child("draws"))?,
+        };
+        let predictive = Predictive {
+            model,
+            declared: declared(self.study.twin(), &model.problem),
+            draws: &draws,
+            noise,
+        };
+        let Some(check) = predictive.check()? else {
+            return Ok((answer, None));
+        };
+        let Some(nothing) = check.nothing(self.found.evidence.base.noise_gain) else {
+            return Ok((answer, Some(check)));
+        };
+        let (disturbance, places) = predictive.disturbance()?.unzip();
+        let answer = answer.swallowed(nothing, places.unwrap_or_default());
+        let check = PredictiveCheck {
+            disturbance,
+            ..check
+        };
+        Ok((answer, Some(check)))
     }
 
     /// Places, missing functions and residuals of a structural gap, and a sparse law for what is missing.

@@ -67,6 +67,24 @@ impl Thresholds {
     pub const STAIRS: usize = 8;
 }
 
+/// Predictive check.
+impl Thresholds {
+    /// Level of the check: a right twin is refused in one of a hundred records. At twice, false alarms take half of what the whole
+    /// diagnosis is allowed.
+    pub const CHECK_LEVEL: f64 = 0.01;
+    /// Records simulated at first: enough for means and deviations.
+    pub const CHECK_FIRST: usize = 24;
+    /// Records simulated in all, where few of the first are as far off as the measured ones: the fewest whose smallest p is below the level.
+    pub const CHECK_RECORDS: usize = 120;
+    /// Share of the output's variance from which noise that was not declared is called a gap: a twin that leaves a quarter to it predicts
+    /// badly. At half of it, records with coloured noise of the declared variance are called; at twice, a pump that stops at random is not.
+    pub const SWALLOWED: f64 = 0.25;
+    /// Standard deviations of its declaration from which a noise level is beyond it.
+    pub const BEYOND_DECLARED: f64 = 3.0;
+    /// Simulated records as far off at which the check has passed.
+    pub const CHECK_ENOUGH: f64 = 3.5;
+}
+
 /// Decision, in nats.
 impl Thresholds {
     /// log of the odds that something is missing from which a gap is told: 20 to 1, since prior odds are even and a false alarm in

@@ -362,6 +362,14 @@ impl Problem {
             .collect()
     }
 
+    /// Process noise of each step of each record given all of it; empty for a black box.
+    pub fn disturbances(&self, theta: &[f64]) -> Result<Vec<Signal>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| self.counted().disturbances(&self.of_record(r, theta), record))
+            .filter_map(Result::transpose)
+            .collect()
+    }
+
     /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
     pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
         // Runs are smooth in θ up to a simulator's own tolerance only.

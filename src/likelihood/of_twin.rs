@@ -16,6 +16,8 @@ pub(crate) trait Likelihood: Send + Sync {
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError>;
     /// States given the whole record; `None` where there are none.
     fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<States>, FilterError>;
+    /// Process noise of each step given the whole record, in state units; `None` where there are no states.
+    fn disturbances(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError>;
     /// Outputs predicted from the rows before, over missing rows as far ahead as these last; `None` where only free runs are known.
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError>;
     /// Log-likelihood, with the innovations where they come at no extra cost.
@@ -76,6 +78,9 @@ impl Likelihood for FilterLikelihood {
     fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<States>, FilterError> {
         self.kalman(record, &self.1)?.smooth(theta).map(Some)
     }
+    fn disturbances(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
+        (self.kalman(record, &self.1)?.disturbances(theta)).map(Some)
+    }
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
         self.kalman(record, &self.1)?.predictions(theta).map(Some)
     }
@@ -123,6 +128,9 @@ impl Likelihood for EnsembleLikelihood {
         Ok((filtered, predicted))
     }
     fn smoothed(&self, _: &[f64], _: &Record) -> Result<Option<States>, FilterError> {
+        Ok(None)
+    }
+    fn disturbances(&self, _: &[f64], _: &Record) -> Result<Option<Signal>, FilterError> {
         Ok(None)
     }
     fn predicted(&self, _: &[f64], _: &Record) -> Result<Option<Signal>, FilterError> {

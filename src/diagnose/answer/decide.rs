@@ -87,6 +87,18 @@ impl Answer {
         }
     }
 
+    /// The answer where noise had swallowed what is missing, so that nothing is missing with this probability only: something unknown, at one
+    /// of these places if they are known.
+    pub fn swallowed(self, nothing: f64, places: Vec<TargetShare>) -> Self {
+        Self {
+            verdict: Verdict::StructuralGap,
+            decision: Decision::NoneOfThese,
+            accepted: vec![],
+            class: vec![],
+            posterior: self.posterior.refuting(nothing, places),
+        }
+    }
+
     /// The place of the first accepted effect, or else the most probable one.
     pub fn place(&self) -> Option<String> {
         let first: Option<EffectKey> = self.accepted.first().and_then(|key| key.parse().ok());

@@ -11,7 +11,7 @@
 //! that explains more with it. An unknown function alone is a listed effect in another form as far as it is no better than an effect
 //! of its own variable, at its place. What it explains more is something unknown beside the effect, if that is 15 % at most.
 
-use crate::diagnose::outcome::Probabilities;
+use crate::diagnose::outcome::{Probabilities, TargetShare};
 use crate::diagnose::price::Price;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
@@ -118,6 +118,22 @@ impl Posterior {
             sets: vec![],
             ..self
         }
+    }
+
+    /// The same where the twin was refuted otherwise, and nothing is missing with this probability only. The places of what is missing are
+    /// these, where any are known.
+    pub fn refuting(self, nothing: f64, places: Vec<TargetShare>) -> Self {
+        let mut posterior = self.without_names();
+        posterior.kinds = Probabilities {
+            nothing,
+            unknown: 1.0 - nothing,
+            ..posterior.kinds
+        };
+        if !places.is_empty() {
+            let places = places.into_iter().map(|t| (t.target, t.probability));
+            posterior.places = places.collect();
+        }
+        posterior
     }
 }
 

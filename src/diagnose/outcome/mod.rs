@@ -1,6 +1,7 @@
 //! Results of a diagnosis.
 
 mod location;
+mod predictive;
 mod warnings;
 
 pub(crate) use location::Cell;
@@ -8,6 +9,7 @@ pub use location::{
     Band, Channel, Lag, Location, Maps, MissingFunction, Onset, Region, TargetShare, Window,
 };
 
+pub use predictive::{Burst, Disturbance, Predicted, PredictiveCheck};
 pub(in crate::diagnose) use warnings::warnings;
 
 use crate::fit::{Nuisance, Warning};
@@ -275,6 +277,8 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The test.
     pub detection: Detection,
+    /// Comparison of the records with simulated ones, where nothing missing was found; none otherwise, and where simulations cost too much.
+    pub check: Option<PredictiveCheck>,
     /// The twin's own parameters.
     pub parameters: Vec<FittedParameter>,
     /// All other estimates.

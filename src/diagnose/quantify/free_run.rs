@@ -89,7 +89,7 @@ pub(in crate::diagnose) fn free_runs(
     }
 }
 
-pub(super) fn variances(y: &Signal) -> Vec<f64> {
+pub(in crate::diagnose) fn variances(y: &Signal) -> Vec<f64> {
     (y.columns().into_iter())
         .map(|y| {
             let there: Array1<f64> = y.iter().copied().filter(|v| !v.is_nan()).collect();
@@ -119,6 +119,6 @@ pub(in crate::diagnose) fn root(squares: &[f64]) -> f64 {
 }
 
 /// Mean; 0 of nothing.
-pub(super) fn mean(values: &[f64]) -> f64 {
+pub(in crate::diagnose) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }

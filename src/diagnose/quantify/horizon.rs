@@ -43,7 +43,7 @@ pub(in crate::diagnose) struct Predictor {
 
 /// Reach of predictions ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Reach {
+pub(in crate::diagnose) enum Reach {
     /// Samples.
     Samples(usize),
     /// From the start, inputs alone.
@@ -70,7 +70,7 @@ impl Predictor {
 
     /// Squared errors over the variance of y, mean over channels, by row that counts; `None` where predictions fail. `scale`
     /// are the variances that errors are divided by.
-    fn errors(
+    pub fn errors(
         &self,
         rows: HeldOutRows<'_>,
         reach: Reach,
@@ -117,7 +117,7 @@ impl Predictor {
 }
 
 /// Horizons that are looked at: one sample, a tenth of the record and between, the free run.
-fn reaches(problem: &Problem, rows: HeldOutRows<'_>) -> Vec<Reach> {
+pub(in crate::diagnose) fn reaches(problem: &Problem, rows: HeldOutRows<'_>) -> Vec<Reach> {
     if problem.is_simulated() {
         return vec![Reach::FreeRun];
     }

@@ -3,6 +3,7 @@
 use super::gaussian::{Belief, Gaussian, Root};
 use super::pass::Sink;
 use super::{FilterError, Kalman, States};
+use crate::record::Signal;
 
 struct Tape {
     filtered: Vec<Gaussian>,
@@ -37,6 +38,38 @@ impl Kalman<'_> {
     ///
     /// As [`log_likelihood`](Self::log_likelihood).
     pub fn smooth(&self, theta: &[f64]) -> Result<States, FilterError> {
+        Ok(self.backwards(theta)?.0)
+    }
+
+    /// Process noise of each step given the whole record, in state units (N × n); zero in the first row, as it moves a state to the row it
+    /// stands in:
+    ///
+    /// ```text
+    /// w_k = Q_k·P⁻_{k+1}⁻¹·(m_{k+1} − m⁻_{k+1})
+    /// ```
+    ///
+    /// Source: Koopman, "Disturbance smoother for state space models", *Biometrika* 80 (1993).
+    ///
+    /// # Errors
+    ///
+    /// As [`log_likelihood`](Self::log_likelihood).
+    pub(crate) fn disturbances(&self, theta: &[f64]) -> Result<Signal, FilterError> {
+        let (states, mut pulls) = self.backwards(theta)?;
+        let acting = self.acting(theta)?;
+        let (mut process, mut measurement) = (vec![0.0; self.states], vec![0.0; self.channels]);
+        for k in 1..states.means.nrows() {
+            process.fill(0.0);
+            measurement.fill(0.0);
+            self.twin.noise(&acting.at(k - 1), &mut process, &mut measurement);
+            for (pull, level) in pulls.row_mut(k).iter_mut().zip(&process) {
+                *pull *= level * level;
+            }
+        }
+        Ok(pulls)
+    }
+
+    /// Smoothed states, and P⁻⁻¹·(m − m⁻) of each row: how strongly the rows from it on pull its prediction (N × n).
+    fn backwards(&self, theta: &[f64]) -> Result<(States, Signal), FilterError> {
         let samples = self.record.samples();
         let mut tape = Tape {
             filtered: Vec::with_capacity(samples),
@@ -45,6 +78,7 @@ impl Kalman<'_> {
         self.run(theta, &mut tape)?;
         let n = self.states;
         let mut states = States::new(samples, n);
+        let mut pulls = Signal::zeros((samples, n));
         let mut root = <Root>::new(n);
         let mut later = Gaussian::zero(n);
         let mut change = vec![0.0; n * n];
@@ -56,6 +90,11 @@ impl Kalman<'_> {
                 for row in gain.chunks_exact_mut(n) {
                     root.solve(row);
                 }
+                let mut pull: Vec<f64> = (later.mean.iter().zip(&next.mean))
+                    .map(|(later, next)| later - next)
+                    .collect();
+                root.solve(&mut pull);
+                pulls.row_mut(k + 1).iter_mut().zip(pull).for_each(|(to, v)| *to = v);
                 for (i, row) in gain.chunks_exact(n).enumerate() {
                     for (j, g) in row.iter().enumerate() {
                         state.mean[i] += g * (later.mean[j] - next.mean[j]);
@@ -76,7 +115,7 @@ impl Kalman<'_> {
             states.set(k, self.held_in_limits(state.clone()).as_belief());
             later = state;
         }
-        Ok(states)
+        Ok((states, pulls))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Section on evidence and limits of the answer.
 
 use super::cause::calibration;
+use super::check::{outcome, table};
 use super::statement::finer_step;
 use super::words::few;
 use crate::diagnose::{Diagnosis, Maps, Visible};
@@ -37,6 +38,7 @@ pub(super) fn section(units: &Units, diagnosis: &Diagnosis) -> Section {
         let all = Block::List(diagnosis.not_tested.clone());
         rest.push(Block::folded("All effects not tested", vec![all]));
     }
+    rest.extend(diagnosis.check.as_ref().map(table));
     rest.extend(power(units, &diagnosis.power));
     Section::new("limits", "How sure, and what was not tested", rest).brief(brief)
 }
@@ -58,6 +60,7 @@ fn items(diagnosis: &Diagnosis) -> Vec<String> {
             None => "The evidence was not calibrated on simulated records.".into(),
         },
     ];
+    items.extend(outcome(diagnosis));
     if diagnosis.location.maps != Maps::default() {
         items.push(
             "Windows, ranges, lags and bands describe the residuals; they test nothing.".into(),

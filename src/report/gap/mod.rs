@@ -4,9 +4,11 @@
 //! |---|---|
 //! | `statement.rs` | the answer in words, and the next step |
 //! | `place.rs`, `cause.rs`, `extent.rs`, `next.rs`, `limits.rs` | a section each |
+//! | `check.rs` | the predictive check |
 //! | `pictures/` | the pictures |
 
 mod cause;
+mod check;
 mod extent;
 mod limits;
 mod next;
@@ -38,6 +40,7 @@ pub const NEXT_INPUT: &str = "next-input.csv";
 /// | key | holds |
 /// |---|---|
 /// | `verdict`, `detection` | kind of gap, and the evidence for it |
+/// | `check` | predictive check of an all-clear: `p_value`, `simulations`, `statistics`, the `disturbance` that fitted noise hides |
 /// | `parameters`, `nuisance` | θ beside the accepted effects; all other estimates |
 /// | `where` | places by probability, missing functions, maps of the residuals, time of a change |
 /// | `which` | effects with probabilities, the accepted ones first, and those that do the same in this twin (`also`); rivals, what remains, the next input |

@@ -1,6 +1,6 @@
 //! Section on the location of a gap: in the twin, in time, missing functions, at values, lags and frequencies.
 
-use super::pictures;
+use super::{check, pictures};
 use super::statement::{accepted_ids, accepted_places, places};
 use super::words::{few, joined};
 use crate::diagnose::{Diagnosis, Maps, Verdict};
@@ -35,6 +35,7 @@ pub(super) fn section(study: &Study, diagnosis: &Diagnosis) -> Section {
         })
         .into_iter()
         .collect();
+    rest.extend(check::disturbance(&units, diagnosis));
     rest.extend(time(diagnosis));
     if let Some(svg) = pictures::functions(study, diagnosis) {
         rest.extend([

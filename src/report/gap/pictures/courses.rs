@@ -4,7 +4,8 @@ use crate::diagnose::{Cell, Diagnosis, Maps, MissingFunction, Onset};
 use crate::report::chart::{
     Area, HeatGroup, HeatRow, Line, Panel, Span, Style, TimeMark, chart, heat_map,
 };
-use crate::report::digits::{named, percent, short};
+use crate::report::digits::{in_unit, named, percent, short};
+use crate::report::gap::check::swallowed;
 use crate::report::gap::statement::accepted_ids;
 use crate::report::record::{RecordPicture, Run};
 use crate::report::units::Units;
@@ -143,6 +144,30 @@ pub fn runs(study: &Study, diagnosis: &Diagnosis, validation: bool) -> Option<St
         marks: change.map(mark).into_iter().collect(),
     };
     Some(picture.svg())
+}
+
+/// The disturbance that fitted noise hides, with its bursts; `None` where there is none.
+pub fn disturbance(diagnosis: &Diagnosis) -> Option<String> {
+    let disturbance = swallowed(diagnosis)?;
+    let spans = (disturbance.bursts.iter())
+        .map(|burst| Span {
+            from: burst.start,
+            to: burst.end,
+            label: String::new(),
+            weight: 1.0,
+            clear: true,
+        })
+        .collect();
+    let line = Line::new("", Style::AFTER, disturbance.course.iter().copied());
+    let y = format!("{}{}", disturbance.place, in_unit(&disturbance.unit));
+    let panel = Panel::new(&y, vec![line]).spans(spans);
+    let description = format!(
+        "What pushes {} against time; {} bursts are larger than noise.",
+        disturbance.place,
+        disturbance.bursts.len()
+    );
+    let axis = ("t in s".to_owned(), vec![panel]);
+    Some(chart("Disturbance", &description, &[axis]))
 }
 
 /// The proposed inputs against time, held over each step; `None` where none is proposed, or the twin has no input.

@@ -1,0 +1,79 @@
+//! The fitted twin with noise as declared, beside which fitted noise is judged.
+
+use super::{Predictive, looks};
+use super::statistics::{Look, Statistic};
+use crate::diagnose::thresholds::Thresholds;
+use crate::fit::problem::Problem;
+use crate::diagnose::quantify::free_run::mean;
+use crate::study::StudyError;
+use crate::twin::{Now, Role, Twin};
+
+/// States and outputs whose noise level a twin with equations declares, at the first row and θ of the prior's centre.
+pub(in crate::diagnose) fn declared(twin: &Twin, problem: &Problem) -> Vec<String> {
+    let Twin::Equations(twin) = twin else {
+        return vec![];
+    };
+    let (outline, drive) = (twin.outline(), problem.records[0].drive());
+    let theta = outline.parameters.centre();
+    let now = Now::new(drive.time(0), drive.dt(), drive.input(0), &theta);
+    let mut process = vec![0.0; outline.states.len()];
+    let mut measurement = vec![0.0; outline.outputs.len()];
+    twin.noise(&now, &mut process, &mut measurement);
+    let all = outline.states.iter().chain(&outline.outputs);
+    (all.zip(process.iter().chain(&measurement)))
+        .filter(|(_, level)| **level > 0.0)
+        .map(|(quantity, _)| quantity.name.clone())
+        .collect()
+}
+
+impl Predictive<'_> {
+    /// The fitted θ with declared levels where they are declared, and without correlated noise; `None` where that is the fitted θ in kind: no
+    /// level beyond its declaration, no correlated noise.
+    pub(super) fn reference(&self) -> Option<Vec<f64>> {
+        let problem = &self.model.problem;
+        let Twin::Equations(twin) = &problem.twin else {
+            return None;
+        };
+        let mut theta = self.model.theta();
+        let mut is_other = false;
+        for (j, p) in problem.twin.parameters().iter().enumerate() {
+            let is_declared = self.declared.iter().any(|name| name == p.target());
+            if p.role == Role::Noise && is_declared {
+                let axis = &problem.axes[j];
+                let beyond = (theta[j] / axis.centre).ln() / axis.deviation;
+                is_other |= beyond > Thresholds::BEYOND_DECLARED;
+                theta[j] = axis.centre;
+            }
+        }
+        for (.., size) in twin.disturbances() {
+            let least = problem.axes[size].bounds.low();
+            is_other |= theta[size] > least;
+            theta[size] = least;
+        }
+        is_other.then(|| problem.full(&theta))
+    }
+
+    /// Share of the output's variance that noise beyond the reference puts into predictions as far ahead as windows of the record reach.
+    pub(super) fn noise_share(
+        &self,
+        statistics: &[Statistic],
+        simulated: &[Look],
+    ) -> Result<Option<f64>, StudyError> {
+        let Some(theta) = self.reference() else {
+            return Ok(None);
+        };
+        let Some(at) = statistics.iter().rposition(Statistic::is_window) else {
+            return Ok(None);
+        };
+        let replicates = self.replicates(0..Thresholds::CHECK_FIRST, |_| &theta)?;
+        let of = &statistics[at..=at];
+        let declared = looks(&self.model.problem, &replicates, of)?;
+        let squares = |values: &mut dyn Iterator<Item = f64>| {
+            let squares: Vec<f64> = values.map(f64::exp).filter(|v| v.is_finite()).collect();
+            mean(&squares)
+        };
+        let fitted = squares(&mut simulated.iter().map(|look| look[at]));
+        let declared = squares(&mut declared.iter().map(|look| look[0]));
+        Ok(Some((fitted - declared).max(0.0)).filter(|share| share.is_finite()))
+    }
+}
