@@ -27,7 +27,7 @@ impl StateSpace for Tank {
         y[0] = x[0];
     }
     // Standard deviations: of the increment added to the level each step, and of the sensor.
-    fn noise(&self, _: &Now, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         (process[0], measurement[0]) = (0.01, 0.02);
     }
 }

@@ -42,7 +42,7 @@ impl StateSpace for Rooms {
         (y[0], y[1]) = (x[1], x[2]);
     }
     // Standard deviations: of the increment added to each state a step, and of each sensor.
-    fn noise(&self, _: &Now, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process.fill(0.005);
         measurement.fill(0.01);
     }

@@ -41,7 +41,7 @@ impl StateSpace for Silverbox {
         y[0] = x[0] + now.theta[3];
     }
     /// The converter's noise alone: what the twin lacks is not to pass for process noise.
-    fn noise(&self, _: &Now, _: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
         measurement[0] = 0.001;
     }
     fn integrator(&self) -> Integrator {

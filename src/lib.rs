@@ -31,7 +31,7 @@
 //!     fn observe(&self, _: &Now, x: &[f64], y: &mut [f64]) {
 //!         y[0] = x[0];
 //!     }
-//!     fn noise(&self, _: &Now, process: &mut [f64], measurement: &mut [f64]) {
+//!     fn noise(&self, _: &Now, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
 //!         (process[0], measurement[0]) = (0.01, 0.02);
 //!     }
 //! }

@@ -44,7 +44,7 @@ impl StateSpace for Chain {
     fn start(&self, _: &Now<'_>, h: &mut [f64]) {
         h.fill(4.0);
     }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process.fill(0.03);
         measurement[0] = 0.05;
     }

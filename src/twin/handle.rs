@@ -268,7 +268,7 @@ mod tests {
         fn start(&self, _: &Now<'_>, x: &mut [f64]) {
             x[0] = 1.0;
         }
-        fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
             measurement[0] = 0.1;
         }
     }

@@ -198,16 +198,18 @@ pub(super) fn observe_lanes(
 pub(super) fn noise_lanes(
     n: usize,
     now: &[Now<'_>],
-    process: &mut [Lanes],
-    measurement: &mut Lanes,
-    noise: impl Fn(&Now<'_>, &mut [f64], &mut [f64]),
+    x: &[Lanes],
+    (process, measurement): (&mut [Lanes], &mut Lanes),
+    noise: impl Fn(&Now<'_>, &[f64], &mut [f64], &mut [f64]),
 ) {
-    let mut levels = [0.0; MOST_STATES + 1];
+    let (mut state, mut levels) = ([0.0; MOST_STATES], [0.0; MOST_STATES + 1]);
+    let state = &mut state[..n];
     let (q, r) = levels[..=n].split_at_mut(n);
     for (lane, at) in now.iter().enumerate() {
         q.fill(0.0);
         r.fill(0.0);
-        noise(at, q, r);
+        gather(&x[..n], lane, state);
+        noise(at, state, q, r);
         scatter(q, (lane, now.len()), &mut process[..n]);
         scatter(r, (lane, now.len()), std::slice::from_mut(measurement));
     }

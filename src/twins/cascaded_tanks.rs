@@ -54,7 +54,7 @@ impl StateSpace for CascadedTanks {
     }
 
     #[inline]
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process.fill(0.1);
         measurement[0] = 0.15;
     }

@@ -40,7 +40,7 @@ impl StateSpace for VanDerPol {
     }
 
     #[inline]
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], _: &mut [f64]) {
+    fn noise(&self, now: &Now<'_>, _: &[f64], process: &mut [f64], _: &mut [f64]) {
         process[1] = now.dt * 0.02f64.sqrt();
     }
 }

@@ -41,7 +41,7 @@ impl StateSpace for Autoregressive {
     fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
         y[0] = x[0];
     }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         (process[0], measurement[0]) = (1.5, 0.02);
     }
 }

@@ -24,7 +24,7 @@ impl StateSpace for BothTanks {
     fn observe(&self, _: &Now<'_>, h: &[f64], y: &mut [f64]) {
         y.copy_from_slice(h);
     }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process.fill(0.1);
         measurement.fill(0.15);
     }

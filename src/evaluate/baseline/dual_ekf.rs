@@ -219,7 +219,7 @@ mod tests {
         fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
             y[0] = x[0];
         }
-        fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
             process[0] = 0.003;
             measurement[0] = 0.02;
         }

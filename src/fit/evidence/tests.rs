@@ -28,7 +28,7 @@ impl StateSpace for Line {
     fn observe(&self, now: &Now<'_>, _: &[f64], y: &mut [f64]) {
         y[0] = now.theta[0] + now.theta[1] * now.u[0];
     }
-    fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
         measurement[0] = 1.0;
     }
 }

@@ -9,8 +9,8 @@ pub(super) trait FilterNumber: Number {
     fn advance(call: Call<'_, '_>, points: Points<'_, Self>) -> Self::Condition;
     /// Outputs of points of `n` states each.
     fn observe(call: Call<'_, '_>, n: usize, points: &[Self], outputs: &mut [Self]);
-    /// Noise levels; both come with any numbers.
-    fn noise(at: Asked<'_, '_>, process: &mut [Self], measurement: &mut [Self]);
+    /// Noise levels at the states `x`; both come with any numbers.
+    fn noise(at: Asked<'_, '_>, x: &[Self], process: &mut [Self], measurement: &mut [Self]);
     /// Puts outputs through the readout; the lanes in which it changed any.
     fn readout(at: Asked<'_, '_>, outputs: &mut [Self]) -> Self::Condition;
 }
@@ -52,10 +52,10 @@ impl FilterNumber for f64 {
         call.twin.observe(&call.now[0], points, outputs);
     }
     #[inline(always)]
-    fn noise((twin, now): Asked<'_, '_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise((twin, now): Asked<'_, '_>, x: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process.fill(0.0);
         measurement.fill(0.0);
-        twin.noise(&now[0], process, measurement);
+        twin.noise(&now[0], x, process, measurement);
     }
     #[inline(always)]
     fn readout((twin, now): Asked<'_, '_>, outputs: &mut [f64]) -> bool {
@@ -78,8 +78,13 @@ impl FilterNumber for Lanes {
             .observe_lanes(call.now, n, points, outputs, buffer);
     }
     #[inline(always)]
-    fn noise((twin, now): Asked<'_, '_>, process: &mut [Self], measurement: &mut [Self]) {
-        twin.noise_lanes(now, process, &mut measurement[0]);
+    fn noise(
+        (twin, now): Asked<'_, '_>,
+        x: &[Self],
+        process: &mut [Self],
+        measurement: &mut [Self],
+    ) {
+        twin.noise_lanes(now, x, process, &mut measurement[0]);
     }
     #[inline(always)]
     fn readout((twin, now): Asked<'_, '_>, outputs: &mut [Self]) -> Mask {

@@ -215,7 +215,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             Some((k, belief)) => {
                 let mut state = FilterState::zero(n);
                 state.set(belief);
-                self.go_to(k);
+                self.go_to(k, &state);
                 self.carry(k, &mut state, &mut root, sink);
                 (k + 1, state)
             }
@@ -255,9 +255,9 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         }
     }
 
-    /// Inputs and noise levels of sample k.
+    /// Inputs of sample k, and noise levels there at the mean of the state.
     #[inline(always)]
-    fn go_to(&mut self, k: usize) {
+    fn go_to(&mut self, k: usize, state: &FilterState<S, N>) {
         for (now, job) in self.now.iter_mut().zip(self.jobs) {
             job.acting.go_to(k, now);
         }
@@ -266,7 +266,10 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             &mut self.q.numbers_mut()[..n],
             &mut self.r.numbers_mut()[..p],
         );
-        N::noise((&self.kalman.twin, &self.now), q, r);
+        // Of a copy: what a call has seen leaves the registers.
+        let x = &mut self.copy.mean.numbers_mut()[..n];
+        x.copy_from_slice(state.belief(n).mean);
+        N::noise((&self.kalman.twin, &self.now), x, q, r);
     }
 
     /// Puts row i into the state.
@@ -280,7 +283,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
     ) -> Result<(), FilterError> {
         let (n, p) = (self.size.states(), self.size.outputs());
         let k = self.order.state_of(i);
-        self.go_to(k);
+        self.go_to(k, state);
         for (j, y) in self.y.numbers_mut()[..p].iter_mut().enumerate() {
             *y = N::of_lanes(|lane| {
                 let job = &self.jobs[held_by(lane, self.jobs.len())];

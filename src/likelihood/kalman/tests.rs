@@ -55,7 +55,7 @@ impl StateSpace for Chain {
     fn start(&self, _: &Now<'_>, x: &mut [f64]) {
         x.copy_from_slice(&[1.0, -0.5]);
     }
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, now: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process.copy_from_slice(&Q.map(|q| q * (now.dt / DT).sqrt()));
         measurement.copy_from_slice(&R[..self.outputs]);
     }

@@ -3,7 +3,7 @@
 use crate::effect::stops;
 use crate::record::Record;
 use crate::twin::{
-    Composed, FittedLevels, Interval, LevelSource, Now, Outline, Parameter, Role, Twin, TwinPart,
+    Composed, FittedLevels, Interval, LevelSource, Outline, Parameter, Role, Twin, TwinPart,
     is_memory,
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -63,16 +63,33 @@ pub(crate) struct Measured {
     pub is_silent: bool,
 }
 
+/// Noise levels that a twin declares, of states for an increment in a step of the study, and of outputs.
+#[derive(Debug, Clone)]
+pub(super) struct DeclaredLevels {
+    pub process: Vec<f64>,
+    pub measurement: Vec<f64>,
+}
+
+/// Sizes of states and outputs, and the noise that is declared of them.
+pub(super) struct Sizes {
+    pub states: Vec<f64>,
+    pub outputs: Vec<f64>,
+    pub declared: DeclaredLevels,
+}
+
 /// The twin with these sizes of states and outputs.
 pub(super) fn build(
     base: &Composed,
     outline: &Outline,
     records: &[Record],
     beliefs: &Beliefs,
-    theta: &[f64],
-    sizes: &[f64],
-    outputs: &[f64],
+    sizes: &Sizes,
 ) -> Measured {
+    let Sizes {
+        states: sizes,
+        outputs,
+        declared,
+    } = sizes;
     let (n, p) = (outline.states.len(), outline.outputs.len());
     let mut noisy = FittedLevels {
         step: beliefs.step,
@@ -81,9 +98,6 @@ pub(super) fn build(
     };
     let mut starts = vec![];
     let twin = Twin::Equations(base.clone());
-    let now = Now::new(0.0, beliefs.step, records[0].drive().input(0), theta);
-    let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
-    base.noise(&now, &mut q, &mut r);
     let step = records[0].drive().dt();
     let longest = records.iter().map(Record::samples).max().unwrap_or(1) as f64 * step;
     let mut levels = Vec::new();
@@ -126,7 +140,7 @@ pub(super) fn build(
         } else {
             format!("{}/√s", state.unit)
         };
-        let declared = q[i] / beliefs.step.sqrt();
+        let declared = declared.process[i] / beliefs.step.sqrt();
         let guess = WANDER * sizes[i] / longest.sqrt();
         let loud = LOUD * sizes[i] / step.sqrt();
         if let Some(entry) = add(&state.name, unit, 0.0, declared, guess, loud) {
@@ -148,7 +162,7 @@ pub(super) fn build(
         } else {
             f64::MIN_POSITIVE
         };
-        let declared = r[j];
+        let declared = declared.measurement[j];
         if let Some(entry) = add(&output.name, unit, floor, declared, guess, loud) {
             noisy.measurement[j] = LevelSource::Fitted { entry, declared };
         }

@@ -21,8 +21,8 @@ use super::ensemble;
 use super::kalman::FilterError;
 use crate::record::Record;
 use crate::twin::{Composed, ParameterSpace, Role, Twin, TwinError, TwinPart, fix};
-use level::build;
-use motion::{followed_motion, free_motion, size};
+use level::{Sizes, build};
+use motion::{declared_levels, followed_motion, free_motion, size};
 use std::collections::BTreeMap;
 
 /// The twin as these records show it. A black box has noise of its own, or is given that of a sensor.
@@ -60,17 +60,15 @@ pub(crate) fn with_levels(
         starts: outline.states.iter().map(|s| s.name.clone()).collect(),
         ..beliefs.clone()
     };
+    let records = std::slice::from_ref(record);
+    let theta = without_effects(&outline.parameters);
     // Sizes make guesses alone, and none is used.
-    let (states, outputs) = (outline.states.len(), outline.outputs.len());
-    let measured = build(
-        base,
-        &outline,
-        std::slice::from_ref(record),
-        &beliefs,
-        &outline.parameters.centre(),
-        &vec![1.0; states],
-        &vec![1.0; outputs],
-    );
+    let sizes = Sizes {
+        states: vec![1.0; outline.states.len()],
+        outputs: vec![1.0; outline.outputs.len()],
+        declared: declared_levels(base, records, &theta, beliefs.step),
+    };
+    let measured = build(base, &outline, records, &beliefs, &sizes);
     let values = |levels: &BTreeMap<String, f64>| -> Vec<f64> {
         let value = |level: &Level| {
             let own = level.declared.unwrap_or(0.0);
@@ -111,17 +109,19 @@ fn measured_equations(
         .map(|j| size_of(&|r| r.outputs().column(j).to_vec()))
         .collect();
     let fallback = outputs.iter().copied().fold(0.0, f64::max);
-    let mut sizes = free_motion(base, records, &theta, fallback);
+    let mut sizes = Sizes {
+        states: free_motion(base, records, &theta, fallback),
+        outputs,
+        declared: declared_levels(base, records, &theta, beliefs.step),
+    };
     // States that follow the record tell their size better than a run that may drift away from it.
-    let loud = build(base, &outline, records, beliefs, &theta, &sizes, &outputs);
+    let loud = build(base, &outline, records, beliefs, &sizes);
     if let Some(followed) = followed_motion(&loud, records, &theta)? {
-        for (size, followed) in sizes.iter_mut().zip(followed) {
+        for (size, followed) in sizes.states.iter_mut().zip(followed) {
             if followed > 0.0 && followed.is_finite() {
                 *size = followed;
             }
         }
     }
-    Ok(build(
-        base, &outline, records, beliefs, &theta, &sizes, &outputs,
-    ))
+    Ok(build(base, &outline, records, beliefs, &sizes))
 }

@@ -1,10 +1,10 @@
-//! Sizes of states: how far they move in runs, or as a filter follows them.
+//! Sizes of states: how far they move in runs, or as a filter follows them; and declared noise levels along the runs.
 
-use super::level::Measured;
+use super::level::{DeclaredLevels, Measured};
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
-use crate::math::deviation;
+use crate::math::{deviation, median};
 use crate::record::Record;
-use crate::twin::{Acting, Composed};
+use crate::twin::{Acting, Composed, Now};
 
 /// Deviation, or what is left of it where nothing moves.
 pub(super) fn size(values: &[f64]) -> f64 {
@@ -23,31 +23,18 @@ pub(super) fn free_motion(
     fallback: f64,
 ) -> Vec<f64> {
     let n = base.outline().states.len();
-    let limits = base.limits();
     let mut distances = vec![Vec::new(); n];
-    let mut work = base.workspace();
     for record in records {
-        let drive = record.drive();
-        let Ok(acting) = Acting::of(base, theta, drive) else {
-            continue;
-        };
-        let (mut x, mut start) = (vec![0.0; n], vec![0.0; n]);
-        base.start(&acting.at(0), &mut x);
-        start.copy_from_slice(&x);
-        for k in 0..drive.samples() {
-            let now = acting.at(k);
-            base.step(&now, &mut x, &mut work);
-            base.constrain(&now, &mut x);
-            for (x, limit) in x.iter_mut().zip(limits) {
-                *x = limit.clamp(*x);
+        let mut start: Vec<f64> = vec![];
+        visit_run(base, record, theta, |_, x| {
+            if start.is_empty() {
+                start = x.to_vec();
+                return;
             }
-            if !x.iter().all(|v| v.abs() < 1e12) {
-                break;
+            for (all, (x, start)) in distances.iter_mut().zip(x.iter().zip(&start)) {
+                all.push((x - start).abs());
             }
-            for (i, x) in x.iter().enumerate() {
-                distances[i].push((x - start[i]).abs());
-            }
-        }
+        });
     }
     (distances.into_iter())
         .map(|mut d| {
@@ -56,6 +43,69 @@ pub(super) fn free_motion(
             if median > 0.0 { median } else { fallback }
         })
         .collect()
+}
+
+/// Shows each state of the twin's run under a record's inputs, the start first, until it diverges.
+fn visit_run(
+    base: &Composed,
+    record: &Record,
+    theta: &[f64],
+    mut visit: impl FnMut(&Now<'_>, &[f64]),
+) {
+    let drive = record.drive();
+    let Ok(acting) = Acting::of(base, theta, drive) else {
+        return;
+    };
+    let (limits, mut work) = (base.limits(), base.workspace());
+    let mut x = vec![0.0; base.outline().states.len()];
+    base.start(&acting.at(0), &mut x);
+    visit(&acting.at(0), &x);
+    for k in 0..drive.samples() {
+        let now = acting.at(k);
+        base.step(&now, &mut x, &mut work);
+        base.constrain(&now, &mut x);
+        for (x, limit) in x.iter_mut().zip(limits) {
+            *x = limit.clamp(*x);
+        }
+        if !x.iter().all(|v| v.abs() < 1e12) {
+            return;
+        }
+        visit(&now, &x);
+    }
+}
+
+/// Returns the medians of the declared levels above zero along runs under the records' inputs: the level itself where it depends on
+/// neither state nor time. A state's level is that of an increment in `step`.
+pub(super) fn declared_levels(
+    base: &Composed,
+    records: &[Record],
+    theta: &[f64],
+    step: f64,
+) -> DeclaredLevels {
+    let outline = base.outline();
+    let (n, p) = (outline.states.len(), outline.outputs.len());
+    let mut levels = vec![Vec::new(); n + p];
+    let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
+    for record in records {
+        visit_run(base, record, theta, |now, x| {
+            q.fill(0.0);
+            r.fill(0.0);
+            base.noise(&Now { dt: step, ..*now }, x, &mut q, &mut r);
+            for (all, level) in levels.iter_mut().zip(q.iter().chain(&r)) {
+                if *level > 0.0 {
+                    all.push(*level);
+                }
+            }
+        });
+    }
+    let mut process: Vec<f64> = (levels.iter())
+        .map(|all| median(all).unwrap_or(0.0))
+        .collect();
+    let measurement = process.split_off(n);
+    DeclaredLevels {
+        process,
+        measurement,
+    }
 }
 
 /// Deviation of each state as a filter with loud noise follows it; `None` where it cannot.

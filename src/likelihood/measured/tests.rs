@@ -55,7 +55,7 @@ fn declared_levels_are_the_twins_own() {
             .twin
             .equations()
             .unwrap()
-            .noise(&now, &mut q, &mut r);
+            .noise(&now, &[1.0; 2], &mut q, &mut r);
         assert!((q[0] - level).abs() < 1e-12 && (r[0] - 0.15).abs() < 1e-12);
     }
 }
@@ -125,9 +125,70 @@ fn levels_are_put_in_the_place_of_the_twins_own() {
     let equations = loud.equations().unwrap();
     let (mut q, mut r, mut start) = ([0.0; 2], [0.0; 1], [0.0; 2]);
     let now = Now::new(0.0, 0.25, &[1.0], &theta);
-    equations.noise(&now, &mut q, &mut r);
+    equations.noise(&now, &[1.0; 2], &mut q, &mut r);
     assert!((q[0] - 0.1 / 2f64.sqrt()).abs() < 1e-12, "declared: {q:?}");
     assert!((q[1] - 0.15).abs() < 1e-12 && (r[0] - 0.05).abs() < 1e-12);
     equations.start_deviation(&now, &mut start);
     assert_eq!(start, [0.0; 2]);
+}
+
+/// A level that halves while a tank runs empty, read with an error of a twentieth of the level.
+struct Reading;
+
+impl crate::twin::StateSpace for Reading {
+    fn outline(&self) -> crate::twin::Outline {
+        crate::twin::Outline::new()
+            .parameter(crate::twin::Parameter::new("k", "1/s", 0.5, 1.5))
+            .state("x", "V")
+            .output("y", "V")
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        dx[0] = -now.theta[0] * x[0];
+    }
+    fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+        x[0] = 8.0;
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y[0] = x[0];
+    }
+    fn noise(&self, _: &Now<'_>, x: &[f64], _: &mut [f64], measurement: &mut [f64]) {
+        measurement[0] = 0.05 * x[0];
+    }
+}
+
+/// Noise follows the states in runs and in filters; one fitted factor multiplies it, whose typical level is declared.
+#[test]
+fn declared_levels_follow_the_states() {
+    let drive = Drive::autonomous(0.01, 300).unwrap();
+    let record = record(&Reading, &[1.0], drive.clone());
+    let mean = Reading.simulate(&[1.0], &drive, Noise::OFF).unwrap();
+    let shares = (record.outputs() / &mean - 1.0) / 0.05;
+    let early = shares.iter().take(150).map(|e| e * e).sum::<f64>() / 150.0;
+    let late = shares.iter().skip(150).map(|e| e * e).sum::<f64>() / 150.0;
+    assert!(
+        (0.7..1.4).contains(&early) && (0.7..1.4).contains(&late),
+        "{early} {late}"
+    );
+    let held = Beliefs {
+        known: ["x".to_owned()].into(),
+        starts: ["x".to_owned()].into(),
+        ..beliefs(0.01)
+    };
+    let twin = Composed::from(Reading);
+    let measured = measured_equations(&twin, std::slice::from_ref(&record), &held).unwrap();
+    let typical = measured.levels[0].declared.unwrap();
+    assert!(
+        (typical / (0.05 * 8.0 * 0.99f64.powi(150)) - 1.0).abs() < 0.02,
+        "{typical}"
+    );
+    let settings = FilterSettings::default();
+    let equations = measured.twin.equations().unwrap();
+    let kalman = Kalman::new(equations, &record, &settings).unwrap();
+    let at = |level: f64| kalman.log_likelihood(&[1.0, level]).unwrap();
+    let residuals = kalman.filter(&[1.0, typical]).unwrap().standardised;
+    let expected: f64 = (residuals.iter().zip(&mean))
+        .map(|(e, y)| -0.5 * (e * e + (std::f64::consts::TAU * (0.05 * y).powi(2)).ln()))
+        .sum();
+    assert!((at(typical) - expected).abs() < 1e-6);
+    assert!(at(typical) > at(2.0 * typical) && at(typical) > at(0.5 * typical));
 }

@@ -157,7 +157,7 @@ fn indexed<'a, T: Copy>(
         .collect()
 }
 
-/// Noise levels of states, then outputs, at the prior's centre.
+/// Noise levels of states, then outputs, at the prior's centre and the start.
 fn declared_noise(twin: &Composed, outline: &Outline, step: f64) -> Vec<f64> {
     let (mut process, mut measurement) = (
         vec![0.0; outline.states.len()],
@@ -166,7 +166,9 @@ fn declared_noise(twin: &Composed, outline: &Outline, step: f64) -> Vec<f64> {
     let centre = outline.parameters.centre();
     let u = vec![0.0; outline.inputs.len()];
     let now = Now::new(0.0, step, &u, &centre);
-    twin.noise(&now, &mut process, &mut measurement);
+    let mut start = vec![0.0; outline.states.len()];
+    twin.start(&now, &mut start);
+    twin.noise(&now, &start, &mut process, &mut measurement);
     process.extend(measurement);
     process
 }

@@ -56,8 +56,14 @@ pub(crate) trait Engine: StateSpace {
         buffer: &mut [f64],
     );
 
-    /// Noise levels of the states, four at most, and the output of several filters, one a lane.
-    fn noise_lanes(&self, now: &[Now<'_>], process: &mut [Lanes], measurement: &mut Lanes);
+    /// Noise levels of the states `x`, four at most, and the output of several filters, one a lane.
+    fn noise_lanes(
+        &self,
+        now: &[Now<'_>],
+        x: &[Lanes],
+        process: &mut [Lanes],
+        measurement: &mut Lanes,
+    );
 
     /// Values of one output of several filters, one a lane, through the readout; returns the lanes that it changed.
     fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES];
@@ -147,13 +153,22 @@ impl<T: StateSpace> Engine for T {
         }
     }
 
-    fn noise_lanes(&self, now: &[Now<'_>], process: &mut [Lanes], measurement: &mut Lanes) {
-        let noise = |now: &Now<'_>, q: &mut [f64], r: &mut [f64]| self.noise(now, q, r);
-        match process.len() {
-            1 => noise_lanes(1, now, process, measurement, noise),
-            2 => noise_lanes(2, now, process, measurement, noise),
-            3 => noise_lanes(3, now, process, measurement, noise),
-            n => noise_lanes(n, now, process, measurement, noise),
+    fn noise_lanes(
+        &self,
+        now: &[Now<'_>],
+        x: &[Lanes],
+        process: &mut [Lanes],
+        measurement: &mut Lanes,
+    ) {
+        let noise = |now: &Now<'_>, x: &[f64], q: &mut [f64], r: &mut [f64]| {
+            self.noise(now, x, q, r);
+        };
+        let (n, levels) = (process.len(), (process, measurement));
+        match n {
+            1 => noise_lanes(1, now, x, levels, noise),
+            2 => noise_lanes(2, now, x, levels, noise),
+            3 => noise_lanes(3, now, x, levels, noise),
+            n => noise_lanes(n, now, x, levels, noise),
         }
     }
 
@@ -244,8 +259,8 @@ impl<T: StateSpace> RunningTwin for Alone<'_, T> {
         self.0.start_deviation(now, std);
     }
     fn begin(&self, _: &Now<'_>, _: &mut [f64]) {}
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.0.noise(now, process, measurement);
+    fn noise(&self, now: &Now<'_>, x: &[f64], process: &mut [f64], measurement: &mut [f64]) {
+        self.0.noise(now, x, process, measurement);
     }
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
         self.0.observe(now, x, y);

@@ -233,18 +233,23 @@ impl Composed {
         observe_lanes(n, now, x, y, buffer, observe);
     }
 
-    /// Noise levels of the states, four at most, and the output of several filters, one a lane.
+    /// Noise levels of the states `x`, four at most, and the output of several filters, one a lane.
     pub(crate) fn noise_lanes(
         &self,
         now: &[Now<'_>],
+        x: &[Lanes],
         process: &mut [Lanes],
         measurement: &mut Lanes,
     ) {
         if self.parts.acts.leave_motion() && !self.parts.acts.on_noise {
-            return self.lanes_alone(now, |now| self.own.noise_lanes(now, process, measurement));
+            return self.lanes_alone(now, |now| {
+                self.own.noise_lanes(now, x, process, measurement);
+            });
         }
-        let noise = |now: &Now<'_>, q: &mut [f64], r: &mut [f64]| self.noise(now, q, r);
-        noise_lanes(process.len(), now, process, measurement, noise);
+        let noise = |now: &Now<'_>, x: &[f64], q: &mut [f64], r: &mut [f64]| {
+            self.noise(now, x, q, r);
+        };
+        noise_lanes(process.len(), now, x, (process, measurement), noise);
     }
 
     /// Puts values of one output of several filters, one a lane, through the readout; returns the lanes that it changed.

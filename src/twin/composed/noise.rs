@@ -4,13 +4,14 @@ use super::{Composed, Disturbance, FittedLevels, Law, LevelSource, TwinPart};
 use crate::twin::Now;
 
 impl Composed {
-    /// Sets the standard deviations of the increment of each state in a step, and of each output; both come zeroed.
-    pub fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    /// Sets the standard deviations of the increment of each state in a step, and of each output, at the states `x`; both come zeroed.
+    pub fn noise(&self, now: &Now<'_>, x: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         let parts = &self.parts;
         self.resolved(now, |now| {
             let dt = parts.noise_step.unwrap_or(now.dt);
-            self.inside(&Now { dt, ..*now }, None, |own| {
-                (self.own).noise(own, &mut process[..parts.states], measurement);
+            self.inside(&Now { dt, ..*now }, Some(x), |own| {
+                let own_states = &mut process[..parts.states];
+                (self.own).noise(own, &x[..parts.states], own_states, measurement);
             });
             if !parts.acts.on_noise {
                 return;

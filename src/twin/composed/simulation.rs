@@ -104,7 +104,7 @@ pub(super) trait RunningTwin {
     fn start(&self, now: &Now<'_>, x: &mut [f64]);
     fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]);
     fn begin(&self, now: &Now<'_>, x: &mut [f64]);
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]);
+    fn noise(&self, now: &Now<'_>, x: &[f64], process: &mut [f64], measurement: &mut [f64]);
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]);
     fn readout(&self, now: &Now<'_>, y: &mut [f64]);
     fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace);
@@ -121,8 +121,8 @@ impl RunningTwin for Composed {
     fn begin(&self, now: &Now<'_>, x: &mut [f64]) {
         self.begin(now, x);
     }
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.noise(now, process, measurement);
+    fn noise(&self, now: &Now<'_>, x: &[f64], process: &mut [f64], measurement: &mut [f64]) {
+        self.noise(now, x, process, measurement);
     }
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
         self.observe(now, x, y);
@@ -188,7 +188,7 @@ pub(super) fn simulate(
         if !noise.is_off() {
             q.fill(0.0);
             r.fill(0.0);
-            twin.noise(&now, &mut q, &mut r);
+            twin.noise(&now, &x, &mut q, &mut r);
             for ((y, r), v) in y.iter_mut().zip(&r).zip(&mut measurement) {
                 if *r != 0.0 {
                     *y += r * v.normal();

@@ -26,7 +26,7 @@ impl StateSpace for Vessel {
     fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
         y[0] = x[0];
     }
-    fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
         measurement[0] = 1e-3;
     }
     fn limits(&self) -> Vec<Interval> {

@@ -77,7 +77,9 @@ fn step_levels(
     let mut process = vec![0.0; outline.states.len()];
     let mut measurement = vec![0.0; outline.outputs.len()];
     let now = Now::new(0.0, drive.step(0), drive.input(0), theta);
-    twin.noise(&now, &mut process, &mut measurement);
+    let mut start = vec![0.0; outline.states.len()];
+    twin.start(&now, &mut start);
+    twin.noise(&now, &start, &mut process, &mut measurement);
     let run = twin.run(theta, drive, Noise::OFF)?;
     let scatter = scatter(twin, theta, drive, &run)?;
     let levels = measurement.iter().zip(scatter).zip(run.columns());

@@ -108,7 +108,7 @@ impl StateSpace for Lag {
     fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
         y.fill(x[0]);
     }
-    fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
         measurement[0] = 0.05;
     }
 }

@@ -299,8 +299,8 @@ impl StateSpace for Unlisted {
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         self.inner().start(now, x);
     }
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.inner().noise(now, process, measurement);
+    fn noise(&self, now: &Now<'_>, x: &[f64], process: &mut [f64], measurement: &mut [f64]) {
+        self.inner().noise(now, x, process, measurement);
     }
     fn limits(&self) -> Vec<truetwin::twin::Interval> {
         self.inner().limits().to_vec()

@@ -31,7 +31,7 @@ pub fn log_likelihood(
         (now.t, now.u) = (drive.time(k), drive.input(k));
         q.fill(0.0);
         r.fill(0.0);
-        twin.noise(&now, &mut q, &mut r);
+        twin.noise(&now, &start, &mut q, &mut r);
         let mut most = f64::NEG_INFINITY;
         for (x, weight) in x.chunks_exact(n).zip(&mut weights) {
             twin.observe(&now, x, &mut y);

@@ -278,7 +278,7 @@ fn smoothing_brings_levels_closer() {
         fn observe(&self, _: &Now<'_>, h: &[f64], y: &mut [f64]) {
             y.copy_from_slice(h);
         }
-        fn noise(&self, _: &Now<'_>, process: &mut [f64], _: &mut [f64]) {
+        fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], _: &mut [f64]) {
             process.fill(0.1);
         }
         fn limits(&self) -> Vec<Interval> {

@@ -106,7 +106,7 @@ impl StateSpace for Chain {
         }
     }
 
-    fn noise(&self, _: &Now, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process.fill(0.005 * self.units.states);
         measurement.fill(0.02 * self.units.outputs);
     }

@@ -55,7 +55,7 @@ pub(super) fn run(
         dead_time.hold_back(&mut y);
         q.fill(0.0);
         r.fill(0.0);
-        twin.noise(&now, &mut q, &mut r);
+        twin.noise(&now, &x, &mut q, &mut r);
         plant.sense(&moment, dt, false, &mut y);
         for (j, y) in y.iter_mut().enumerate() {
             let level = conditions.measurement * r[j].hypot(conditions.added_to(j));
@@ -293,7 +293,7 @@ mod tests {
         fn start(&self, _: &Now<'_>, x: &mut [f64]) {
             x[0] = 1.0;
         }
-        fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
             (process[0], measurement[0]) = (self.0, self.0);
         }
         fn integrator(&self) -> Integrator {

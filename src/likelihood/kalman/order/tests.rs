@@ -32,7 +32,7 @@ impl StateSpace for Leak {
     fn start_deviation(&self, _: &Now<'_>, std: &mut [f64]) {
         std[0] = 0.5;
     }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process[0] = 0.3;
         measurement.copy_from_slice(&[0.4, 0.1]);
     }

@@ -22,7 +22,7 @@ impl StateSpace for Walk {
     fn start(&self, _: &Now<'_>, x: &mut [f64]) {
         x[0] = 1.0;
     }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         process[0] = 0.3;
         measurement[1] = 0.2;
     }

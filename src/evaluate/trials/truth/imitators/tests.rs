@@ -27,7 +27,7 @@ impl StateSpace for Vessel {
     fn start(&self, _: &Now<'_>, x: &mut [f64]) {
         x[0] = 2.0;
     }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
         (process[0], measurement[0]) = (0.01, 0.02);
     }
     fn stepping(&self) -> Stepping {

@@ -123,7 +123,7 @@ fn information_is_that_of_theory() {
         fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
             y[0] = x[0];
         }
-        fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
             measurement[0] = 0.1;
         }
         fn stepping(&self) -> crate::twin::Stepping {
