@@ -365,7 +365,10 @@ impl Problem {
     /// Process noise of each step of each record given all of it; empty for a black box.
     pub fn disturbances(&self, theta: &[f64]) -> Result<Vec<Signal>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.counted().disturbances(&self.of_record(r, theta), record))
+            .map(|(r, record)| {
+                self.counted()
+                    .disturbances(&self.of_record(r, theta), record)
+            })
             .filter_map(Result::transpose)
             .collect()
     }

@@ -28,7 +28,8 @@ impl PredictiveCheck {
 
     /// Returns whether noise of a kind or size that was not declared puts much into the output.
     pub fn is_loud(&self) -> bool {
-        self.noise_share.is_some_and(|share| share > Thresholds::SWALLOWED)
+        self.noise_share
+            .is_some_and(|share| share > Thresholds::SWALLOWED)
     }
 
     /// Probability that nothing is missing where the check refutes an all-clear; `None` where it does not. A failed check leaves what its
@@ -53,8 +54,7 @@ impl PredictiveCheck {
 
     /// The statistic in which the records depart most from simulated ones.
     pub fn clearest(&self) -> Option<&Predicted> {
-        let size = |row: &&Predicted| row.deviations.abs();
-        (self.rows.iter()).max_by(|a, b| size(a).total_cmp(&size(b)))
+        (self.rows.iter()).max_by(|a, b| a.departure.total_cmp(&b.departure))
     }
 }
 
@@ -70,6 +70,9 @@ pub struct Predicted {
     pub expected: [f64; 2],
     /// Distance from the mean of simulated records, in their standard deviations.
     pub deviations: f64,
+    /// How far that counts against the twin.
+    #[serde(skip)]
+    pub(in crate::diagnose) departure: f64,
 }
 
 /// Noise that is none: it is larger, in windows of some length, than noise as declared.

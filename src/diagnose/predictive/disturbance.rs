@@ -9,21 +9,22 @@
 //! ```
 //!
 //! Simulated is the fitted twin with noise as declared, or as fitted where nothing is declared. The place is that with the largest z; the
-//! probability of a place is in proportion to e^(z²/2), its likelihood ratio if z is normal. Bursts are windows of the clearest length
-//! beyond what 95 % of simulated records have anywhere.
+//! probability of a place is in proportion to e^(z²/2), its likelihood ratio if z is normal. Bursts are windows beyond what 95 % of
+//! simulated records have anywhere, of the clearest length with which they are half of the record at most.
 
 use super::{Predictive, Replicate};
 use crate::diagnose::outcome::{Burst, Disturbance, TargetShare};
+use crate::diagnose::quantify::free_run::mean;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
-use crate::diagnose::quantify::free_run::mean;
 use crate::math::{deviation, quantile};
 use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::{Entry, Role, Twin};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A place that may be disturbed.
 struct Place {
@@ -47,8 +48,8 @@ struct Scan {
 /// How clear the disturbance of a place is, and in which windows.
 struct Clearest {
     score: f64,
-    /// Windows, and what 95 % of simulated records do not reach in any.
-    scan: Option<(Scan, f64)>,
+    /// Windows of each length and kind, clearest first, and what 95 % of simulated records do not reach in any.
+    scans: Vec<(Scan, f64)>,
     size: f64,
     expected: f64,
 }
@@ -93,10 +94,16 @@ impl Predictive<'_> {
             unit: place.unit.clone(),
             size: clear.size,
             expected: clear.expected,
-            time_scale: clear.scan.map(|(scan, _)| scan.length as f64 * drive.dt()),
-            bursts: clear.scan.map_or(vec![], |(scan, limit)| {
-                bursts(record, &measured[first][0], scan, limit)
-            }),
+            time_scale: (clear.scans.first()).map(|(scan, _)| scan.length as f64 * drive.dt()),
+            bursts: (clear.scans.iter())
+                .map(|(scan, limit)| scan.bursts(&measured[first][0], *limit))
+                .find(|all| {
+                    let rows: usize = all.iter().map(|stretch| stretch.len()).sum();
+                    rows > 0 && 2 * rows <= record.samples()
+                })
+                .map_or(vec![], |all| {
+                    all.iter().map(|stretch| burst(record, stretch)).collect()
+                }),
             course: (measured[first][0].iter().enumerate())
                 .map(|(k, value)| (drive.time(k), *value))
                 .collect(),
@@ -125,7 +132,12 @@ fn places(problem: &Problem) -> Vec<Place> {
             };
             let (name, entry) = (state.name.clone(), Entry::State(i));
             let memories = memories(entry);
-            all.push(Place { name, unit, entry, memories });
+            all.push(Place {
+                name,
+                unit,
+                entry,
+                memories,
+            });
         }
     }
     let sensors = targets(TargetKind::Sensor, None, &problem.twin.signals());
@@ -133,7 +145,12 @@ fn places(problem: &Problem) -> Vec<Place> {
         let (name, unit, entry) = (sensors[j].clone(), output.unit.clone(), Entry::Sensor(j));
         let memories = memories(entry);
         if !memories.is_empty() {
-            all.push(Place { name, unit, entry, memories });
+            all.push(Place {
+                name,
+                unit,
+                entry,
+                memories,
+            });
         }
     }
     all
@@ -173,10 +190,11 @@ fn clearest(measured: &Course, simulated: &[&Course]) -> Clearest {
     let sizes: Vec<f64> = simulated.iter().map(|course| rms(course)).collect();
     let mut best = Clearest {
         score: 0.0,
-        scan: None,
+        scans: vec![],
         size: rms(measured),
         expected: mean(&sizes),
     };
+    let mut clear = vec![];
     let longest = measured.iter().map(Vec::len).max().unwrap_or(0) / 8;
     let lengths = std::iter::successors(Some(1), |length| Some(2 * length));
     for length in lengths.take_while(|length| *length <= longest.max(1)) {
@@ -188,12 +206,15 @@ fn clearest(measured: &Course, simulated: &[&Course]) -> Clearest {
             };
             let values: Vec<f64> = simulated.iter().map(|course| largest(course)).collect();
             let z = (largest(measured) - mean(&values)) / deviation(&values);
-            if z.is_finite() && z > best.score {
+            if z.is_finite() {
                 let limit = quantile(&values, 0.95).map_or(f64::INFINITY, f64::exp);
-                (best.score, best.scan) = (z, Some((scan, limit)));
+                clear.push((z, (scan, limit)));
             }
         }
     }
+    clear.sort_by(|a, b| b.0.total_cmp(&a.0));
+    best.score = clear.first().map_or(0.0, |(z, _)| z.max(0.0));
+    best.scans = clear.into_iter().map(|(_, scan)| scan).collect();
     best
 }
 
@@ -215,27 +236,30 @@ impl Scan {
         }
         all
     }
-}
 
-/// Stretches of a record that lie in windows beyond a limit.
-fn bursts(record: &Record, w: &[f64], scan: Scan, limit: f64) -> Vec<Burst> {
-    let mut stretches: Vec<(usize, usize)> = vec![];
-    for (first, value) in scan.windows(w).into_iter().enumerate() {
-        if value > limit {
-            let end = first + scan.length;
-            match stretches.last_mut() {
-                Some(last) if first <= last.1 => last.1 = end,
-                _ => stretches.push((first, end)),
+    /// Stretches of samples in windows beyond a limit.
+    fn bursts(self, d: &[f64], limit: f64) -> Vec<Range<usize>> {
+        let mut all: Vec<Range<usize>> = vec![];
+        for (first, value) in self.windows(d).into_iter().enumerate() {
+            if value > limit {
+                let end = first + self.length;
+                match all.last_mut() {
+                    Some(last) if first <= last.end => last.end = end,
+                    _ => all.push(first..end),
+                }
             }
         }
+        all
     }
+}
+
+/// A stretch of samples in seconds.
+fn burst(record: &Record, stretch: &Range<usize>) -> Burst {
     let time = |k: usize| record.drive().time(k.min(record.samples() - 1));
-    (stretches.into_iter())
-        .map(|(first, end)| Burst {
-            start: time(first),
-            end: time(end),
-        })
-        .collect()
+    Burst {
+        start: time(stretch.start),
+        end: time(stretch.end),
+    }
 }
 
 #[cfg(test)]
@@ -249,5 +273,10 @@ mod tests {
         assert_eq!(scan(1, true), [1.0, 1.0, 2.0, 2.0]);
         assert_eq!(scan(2, false), [1.0, 2.5, 4.0]);
         assert_eq!(scan(5, true), [0.0; 0]);
+        let pairs = Scan {
+            length: 2,
+            is_push: false,
+        };
+        assert_eq!(pairs.bursts(&w, 2.0), [1..4]);
     }
 }

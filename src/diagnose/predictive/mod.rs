@@ -6,10 +6,10 @@
 //!
 //! ```text
 //! z_s = (mean T_s of the measured records − mean T_s of simulated ones)/deviation of simulated ones
-//! p   = share of simulated records with max |z_s| as large,  each compared with all
+//! p   = share of simulated records with max_s as large: of |z_s|, of z_s where less than usual is no fault (tails, bursts, correlation)
 //! ```
 //!
-//! The largest |z| has its own distribution here, so the number of statistics does not matter. Simulations end early where many have as
+//! The largest z has its own distribution here, so the number of statistics does not matter. Simulations end early where many have as
 //! large a one. A statistic at the fitted θ is a little too good, at draws a little too bad; the check is then rather too quiet.
 //!
 //! Sources: Gelman, Meng & Stern, "Posterior predictive assessment of model fitness via realized discrepancies", *Statistica Sinica* 6
@@ -21,10 +21,10 @@ mod statistics;
 
 pub(in crate::diagnose) use reference::declared;
 
-use super::outcome::{PredictiveCheck, Predicted};
+use super::outcome::{Predicted, PredictiveCheck};
 use super::thresholds::Thresholds;
-use crate::fit::problem::Problem;
 use crate::fit::posterior::PosteriorSample;
+use crate::fit::problem::Problem;
 use crate::hypothesis::search::model::Model;
 use crate::math::{deviation, quantile};
 use crate::record::Record;
@@ -74,15 +74,20 @@ impl Predictive<'_> {
             }
         }
         let noise_share = self.noise_share(&statistics, &simulated)?;
-        Ok(compared.map(|check| PredictiveCheck { noise_share, ..check }))
+        Ok(compared.map(|check| PredictiveCheck {
+            noise_share,
+            ..check
+        }))
     }
 
     /// The statistics of the measured records: means over draws.
     fn measured(&self, statistics: &[Statistic]) -> Result<Look, StudyError> {
         let problem = &self.model.problem;
-        let draws = self.draws.thetas.iter().step_by(
-            (self.draws.thetas.len() / Thresholds::CHECK_FIRST).max(1),
-        );
+        let draws = self
+            .draws
+            .thetas
+            .iter()
+            .step_by((self.draws.thetas.len() / Thresholds::CHECK_FIRST).max(1));
         let measured: Vec<Replicate> = draws
             .map(|theta| Replicate {
                 theta: theta.clone(),
@@ -153,8 +158,10 @@ fn compare(statistics: &[Statistic], measured: &Look, simulated: &[Look]) -> Pre
         })
         .collect();
     let largest = |look: &Look| {
-        let off = columns.iter().map(|(s, mean, spread)| ((look[*s] - mean) / spread).abs());
-        off.fold(0.0, f64::max)
+        let departure = |(s, mean, spread): &(usize, f64, f64)| {
+            statistics[*s].departure((look[*s] - mean) / spread)
+        };
+        columns.iter().map(departure).fold(0.0, f64::max)
     };
     let own = largest(measured);
     let above = simulated.iter().filter(|look| largest(look) >= own).count();
@@ -167,6 +174,7 @@ fn compare(statistics: &[Statistic], measured: &Look, simulated: &[Look]) -> Pre
                 measured: statistics[s].shown(measured[s]),
                 expected: [end(0.05), end(0.95)],
                 deviations: (measured[s] - mean) / spread,
+                departure: statistics[s].departure((measured[s] - mean) / spread),
             }
         })
         .collect();

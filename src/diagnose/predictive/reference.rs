@@ -1,10 +1,10 @@
 //! The fitted twin with noise as declared, beside which fitted noise is judged.
 
-use super::{Predictive, looks};
 use super::statistics::{Look, Statistic};
+use super::{Predictive, looks};
+use crate::diagnose::quantify::free_run::mean;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::problem::Problem;
-use crate::diagnose::quantify::free_run::mean;
 use crate::study::StudyError;
 use crate::twin::{Now, Role, Twin};
 
@@ -16,9 +16,11 @@ pub(in crate::diagnose) fn declared(twin: &Twin, problem: &Problem) -> Vec<Strin
     let (outline, drive) = (twin.outline(), problem.records[0].drive());
     let theta = outline.parameters.centre();
     let now = Now::new(drive.time(0), drive.dt(), drive.input(0), &theta);
+    let mut start = vec![0.0; outline.states.len()];
+    twin.start(&now, &mut start);
     let mut process = vec![0.0; outline.states.len()];
     let mut measurement = vec![0.0; outline.outputs.len()];
-    twin.noise(&now, &mut process, &mut measurement);
+    twin.noise(&now, &start, &mut process, &mut measurement);
     let all = outline.states.iter().chain(&outline.outputs);
     (all.zip(process.iter().chain(&measurement)))
         .filter(|(_, level)| **level > 0.0)

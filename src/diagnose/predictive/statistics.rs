@@ -46,9 +46,20 @@ impl Statistic {
             .collect();
         let record = &problem.records[0];
         // One sample ahead is what innovations are.
-        let further = reaches(problem, HeldOutRows { record, from: 0 }).into_iter().skip(1);
+        let further = reaches(problem, HeldOutRows { record, from: 0 })
+            .into_iter()
+            .skip(1);
         all.extend(further.map(|reach| Self::Error(reach, record.drive().dt())));
         all
+    }
+
+    /// Departure from simulated records that counts, from the distance to their mean in standard deviations: readings that are rounded have
+    /// light tails, and what is less correlated than noise is no gap.
+    pub fn departure(&self, deviations: f64) -> f64 {
+        match self {
+            Self::Spread(_) | Self::Error(..) => deviations.abs(),
+            Self::Whiteness(_) | Self::Tails(_) | Self::Bursts(_) => deviations.max(0.0),
+        }
     }
 
     /// Returns whether it is the error of windows, and no free run's.
@@ -116,12 +127,19 @@ pub(super) fn look(
     }
     let series = |output: &str| -> Vec<Vec<f64>> {
         let outline = problem.outline();
-        let j = outline.outputs.iter().position(|o| o.name == output).unwrap_or(0);
+        let j = outline
+            .outputs
+            .iter()
+            .position(|o| o.name == output)
+            .unwrap_or(0);
         (filtered.iter().zip(records))
             .map(|(filtered, record)| {
                 let v = filtered.standardised.column(j);
                 let y = record.outputs().column(j);
-                v.iter().zip(y).map(|(v, y)| if y.is_nan() { f64::NAN } else { *v }).collect()
+                v.iter()
+                    .zip(y)
+                    .map(|(v, y)| if y.is_nan() { f64::NAN } else { *v })
+                    .collect()
             })
             .collect()
     };
@@ -165,7 +183,10 @@ pub(super) fn mean_power(series: &[Vec<f64>], power: i32) -> f64 {
 pub(super) fn squared(series: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mean = mean_power(series, 2);
     let square = |v: &f64| v * v - mean;
-    series.iter().map(|all| all.iter().map(square).collect()).collect()
+    series
+        .iter()
+        .map(|all| all.iter().map(square).collect())
+        .collect()
 }
 
 /// Σ n·ρ_l² over the lags, n the number of pairs.
@@ -174,9 +195,15 @@ pub(super) fn correlation(series: &[Vec<f64>]) -> f64 {
     (1..=Thresholds::LAGS)
         .map(|lag| {
             let pairs = (series.iter()).flat_map(|all| all.iter().zip(all.iter().skip(lag)));
-            let there = pairs.map(|(a, b)| a * b).filter(|product| !product.is_nan());
+            let there = pairs
+                .map(|(a, b)| a * b)
+                .filter(|product| !product.is_nan());
             let (sum, count) = there.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-            if count == 0.0 { 0.0 } else { sum * sum / (count * power * power) }
+            if count == 0.0 {
+                0.0
+            } else {
+                sum * sum / (count * power * power)
+            }
         })
         .sum()
 }

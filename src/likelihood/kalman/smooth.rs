@@ -60,7 +60,9 @@ impl Kalman<'_> {
         for k in 1..states.means.nrows() {
             process.fill(0.0);
             measurement.fill(0.0);
-            self.twin.noise(&acting.at(k - 1), &mut process, &mut measurement);
+            let x = states.means.row(k - 1).to_vec();
+            self.twin
+                .noise(&acting.at(k - 1), &x, &mut process, &mut measurement);
             for (pull, level) in pulls.row_mut(k).iter_mut().zip(&process) {
                 *pull *= level * level;
             }
@@ -94,7 +96,11 @@ impl Kalman<'_> {
                     .map(|(later, next)| later - next)
                     .collect();
                 root.solve(&mut pull);
-                pulls.row_mut(k + 1).iter_mut().zip(pull).for_each(|(to, v)| *to = v);
+                pulls
+                    .row_mut(k + 1)
+                    .iter_mut()
+                    .zip(pull)
+                    .for_each(|(to, v)| *to = v);
                 for (i, row) in gain.chunks_exact(n).enumerate() {
                     for (j, g) in row.iter().enumerate() {
                         state.mean[i] += g * (later.mean[j] - next.mean[j]);

@@ -3,8 +3,8 @@
 use super::pictures;
 use crate::diagnose::{Diagnosis, Disturbance, Predicted, PredictiveCheck};
 use crate::report::digits::{chance, percent, short, with_unit};
-use crate::report::document::Column::{Number, Text};
 use crate::report::document::Block;
+use crate::report::document::Column::{Number, Text};
 use crate::report::units::Units;
 
 /// Bursts that the text names.
@@ -35,7 +35,11 @@ pub(super) fn outcome(diagnosis: &Diagnosis) -> Option<String> {
 
 fn departure(row: &Predicted) -> String {
     let [low, high] = row.expected.map(short);
-    format!("{} {}, expected {low} to {high}", row.statistic, short(row.measured))
+    format!(
+        "{} {}, expected {low} to {high}",
+        row.statistic,
+        short(row.measured)
+    )
 }
 
 /// The disturbance of a record that the check refused: words, then a picture.

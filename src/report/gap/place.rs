@@ -1,8 +1,8 @@
 //! Section on the location of a gap: in the twin, in time, missing functions, at values, lags and frequencies.
 
-use super::{check, pictures};
 use super::statement::{accepted_ids, accepted_places, places};
 use super::words::{few, joined};
+use super::{check, pictures};
 use crate::diagnose::{Diagnosis, Maps, Verdict};
 use crate::report::digits::{chance, short, unit_suffix};
 use crate::report::document::{Block, Section};

@@ -99,7 +99,8 @@ impl Composed {
     /// Returns the disturbances: where each enters, the index of its state, the entry of its size in θ.
     pub(crate) fn disturbances(&self) -> Vec<(Entry, usize, usize)> {
         let all = self.parts.disturbances();
-        all.map(|(_, part, state)| (part.entry, state, part.sigma)).collect()
+        all.map(|(_, part, state)| (part.entry, state, part.sigma))
+            .collect()
     }
 
     /// Returns the integrator.

@@ -4,6 +4,7 @@ mod black_box;
 mod complete;
 mod share;
 mod study_of_many;
+mod swallowed;
 mod trials;
 
 use crate::binomial_bounds;

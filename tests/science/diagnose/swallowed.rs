@@ -1,0 +1,89 @@
+//! Disturbances that fitted noise would swallow, and honest noise that it would not.
+
+use super::trials::{study, with_settings};
+use super::{Decision, Verdict};
+use truetwin::diagnose::{DiagnoseSettings, Diagnosis};
+use truetwin::record::{Drive, Record, Signal};
+use truetwin::twin::Noise;
+
+/// Step and length of the oscillator's records.
+const STEP: f64 = 0.05;
+const SAMPLES: usize = 300;
+/// Process noise of the second state in a step, as the twin declares it.
+const DECLARED: f64 = 0.007_07;
+
+/// Record of an oscillator whose second state is pushed by `push` in each step.
+fn oscillator(nu: f64, mut push: impl FnMut(usize) -> f64) -> Record {
+    let (mut x, mut v) = (1.0_f64, 0.0);
+    let y = Signal::from_shape_fn((SAMPLES, 1), |(k, _)| {
+        let y = x;
+        let rate = nu * (1.0 - x * x) * v - x;
+        (x, v) = (x + STEP * v, v + STEP * rate + push(k));
+        y
+    });
+    Record::new(Drive::autonomous(STEP, SAMPLES).unwrap(), y).unwrap()
+}
+
+fn quick(record: Record) -> Diagnosis {
+    let settings = DiagnoseSettings {
+        quick: true,
+        ..DiagnoseSettings::default()
+    };
+    with_settings(&study("van-der-pol"), record, &settings)
+}
+
+#[test]
+fn bursts_of_a_force_are_no_noise() {
+    for seed in 0..4 {
+        let mut source = Noise::new(71, "bursts", seed).source("push");
+        let mut left = 0;
+        let record = oscillator(1.1, |k| {
+            // Three bursts of half a second.
+            left = if k % 90 == 45 { 10 } else { left - 1 };
+            let force = if left > 0 { 1.5 * STEP } else { 0.0 };
+            (force + DECLARED) * source.normal()
+        });
+        let found = quick(record);
+        let check = found
+            .check
+            .as_ref()
+            .expect("no effect explains random bursts");
+        assert_eq!(found.verdict, Verdict::StructuralGap, "{seed}: {check:?}");
+        assert_eq!(found.cause.decision, Decision::NoneOfThese);
+        assert!(found.cause.probabilities.nothing < 0.5);
+        let disturbance = check.disturbance.as_ref().unwrap();
+        assert_eq!(found.location.target.as_deref(), Some("x2"), "{seed}");
+        assert_eq!(disturbance.place, "x2");
+        assert!(disturbance.size > 2.0 * disturbance.expected);
+        let is_near =
+            |t: f64| (disturbance.bursts.iter()).any(|b| b.start - 1.0 < t && t < b.end + 1.0);
+        assert!(
+            is_near(2.5) || is_near(7.0) || is_near(11.5),
+            "{disturbance:?}"
+        );
+    }
+}
+
+/// Level of the noise, correlation from a sample to the next.
+#[test]
+fn loud_and_coloured_noise_are_no_gap() {
+    for (loud, memory) in [(1.0, 0.0), (3.0, 0.0), (1.0, 0.7)] {
+        for seed in 0..3 {
+            let mut source = Noise::new(72, "honest", seed).source("push");
+            let mut w = 0.0;
+            let record = oscillator(1.3, |_| {
+                let fresh = (1.0_f64 - memory * memory).sqrt();
+                w = memory * w + fresh * loud * DECLARED * source.normal();
+                w
+            });
+            let found = quick(record);
+            let check = found.check.as_ref();
+            assert_eq!(
+                found.verdict,
+                Verdict::NoGap,
+                "{loud} {memory} {seed}: {check:?}"
+            );
+            assert!(check.is_some_and(|check| check.disturbance.is_none()));
+        }
+    }
+}
