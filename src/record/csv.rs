@@ -126,8 +126,8 @@ fn csv_text(drive: &Drive, outputs: &Signal) -> String {
     let mut text = header.join(",") + "\n";
     for k in 0..drive.samples() {
         let t = match drive.is_uniform() {
-            true => rounded_time(drive.time(k), drive.dt()),
-            false => drive.time(k),
+            true => rounded_time(drive.own_time(k), drive.dt()),
+            false => drive.own_time(k),
         };
         text += &t.to_string();
         for value in drive.input(k).iter().chain(outputs.row(k)) {

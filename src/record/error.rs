@@ -69,6 +69,9 @@ pub enum RecordError {
         "column t: the steps vary, and a black-box twin is simulated with one step; resample the record"
     )]
     OneStep,
+    /// A start that belongs to a time after the first row, or to one too long before it.
+    #[error("{0}")]
+    Start(String),
     /// A step that a record cannot be resampled to.
     #[error("{0}")]
     Resample(String),

@@ -101,7 +101,8 @@ pub fn resample(
             }
         }
     }
-    let drive = Drive::new(step, resampled_inputs(drive, step, samples, rule))?;
+    let inputs = resampled_inputs(drive, step, samples, rule);
+    let drive = Drive::new(step, inputs)?.beginning_at(drive.first_time());
     Ok(Resampled {
         record: Record::new(drive, all)?,
         interpolated,

@@ -57,7 +57,7 @@ impl Study {
             "choose a level between 0 and 1, such as 0.9",
         )?;
         for record in records {
-            record.check_channels(&self.twin.signals())?;
+            self.check_channels(record)?;
         }
         let clock = Instant::now();
         let study = self.for_records(records)?;
@@ -77,7 +77,7 @@ impl Study {
     ///
     /// [`StudyError`]: a record that does not fit the twin, a twin that cannot be filtered there.
     pub fn score(&self, fit: &Fit, record: &Record) -> Result<FitScore, StudyError> {
-        record.check_channels(&self.twin.signals())?;
+        self.check_channels(record)?;
         let study = self.for_records(std::slice::from_ref(record))?;
         let subject = Subject {
             twin: &study.twin,

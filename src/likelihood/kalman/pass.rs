@@ -247,11 +247,36 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             let i = held_by(lane, self.jobs.len());
             mean.fill(0.0);
             cov.fill(0.0);
-            (self.jobs[i].kalman).start(&self.now[i], &mut mean, &mut cov, &mut scale);
+            let now = self.jobs[i].acting.start();
+            (self.jobs[i].kalman).start(&now, &mut mean, &mut cov, &mut scale);
             let to = means.iter_mut().chain(&mut *covs);
             for (to, value) in to.zip(mean.iter().chain(&cov)) {
                 *to.lane_mut(lane) = *value;
             }
+        }
+        // Filters side by side have as many steps before their first rows.
+        let steps = self.jobs[0].acting.steps_before();
+        if steps > 0 {
+            let mut state = FilterState::zero(n);
+            state.set(self.copy.belief(n));
+            self.run_to_first_row(steps, &mut state);
+            self.copy.set(state.belief(n));
+        }
+    }
+
+    /// Carries the start to the first row.
+    #[cold]
+    fn run_to_first_row(&mut self, steps: usize, state: &mut FilterState<S, N>) {
+        let mut root = Root::new(self.size.states());
+        for i in 0..steps {
+            for (now, job) in self.now.iter_mut().zip(self.jobs) {
+                *now = job.acting.before(i);
+            }
+            self.set_noise(state);
+            self.carry(0, state, &mut root, &mut ());
+        }
+        for (now, job) in self.now.iter_mut().zip(self.jobs) {
+            *now = job.acting.at(0);
         }
     }
 
@@ -261,6 +286,12 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         for (now, job) in self.now.iter_mut().zip(self.jobs) {
             job.acting.go_to(k, now);
         }
+        self.set_noise(state);
+    }
+
+    /// Noise levels of the present step at the mean of the state.
+    #[inline(always)]
+    fn set_noise(&mut self, state: &FilterState<S, N>) {
         let (n, p) = (self.size.states(), self.size.outputs());
         let (q, r) = (
             &mut self.q.numbers_mut()[..n],

@@ -58,7 +58,7 @@ fn visit_run(
     };
     let (limits, mut work) = (base.limits(), base.workspace());
     let mut x = vec![0.0; base.outline().states.len()];
-    base.start(&acting.at(0), &mut x);
+    base.run_to_first_row(&acting, &mut work, &mut x);
     visit(&acting.at(0), &x);
     for k in 0..drive.samples() {
         let now = acting.at(k);

@@ -100,7 +100,7 @@ pub(super) fn in_seconds(record: Record, unit: f64) -> Result<Record, RecordErro
     }
     let drive = record.drive();
     let times: Vec<f64> = (0..record.samples())
-        .map(|k| drive.time(k) / unit)
+        .map(|k| drive.own_time(k) / unit)
         .collect();
     let drive = Drive::with_times(&times, drive.inputs().clone())?;
     Record::new(drive, record.outputs().clone())

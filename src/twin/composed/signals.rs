@@ -1,10 +1,10 @@
 //! Outputs, starts and inputs of composed equations.
 
 use super::parts::{Added, Theta};
-use super::{Composed, Disturbance, Entry, Law, LawPart, LawPlace, SignalChange, TwinPart};
+use super::{Acting, Composed, Disturbance, Entry, Law, LawPart, LawPlace, SignalChange, TwinPart};
 use crate::record::{Drive, RecordError, Signal};
 use crate::twin::points::Layout;
-use crate::twin::{Now, SimulationError};
+use crate::twin::{Now, SimulationError, Workspace};
 use smallvec::SmallVec;
 
 /// Outputs of points that are kept on the stack.
@@ -131,7 +131,25 @@ impl Composed {
         })
     }
 
-    /// Sets the first state.
+    /// Sets `x` to the state at the first row, from the start on without noise.
+    pub(crate) fn run_to_first_row(
+        &self,
+        acting: &Acting<'_>,
+        work: &mut Workspace,
+        x: &mut [f64],
+    ) {
+        self.start(&acting.start(), x);
+        for i in 0..acting.steps_before() {
+            let now = acting.before(i);
+            self.step(&now, x, work);
+            self.constrain(&now, x);
+            for (x, limit) in x.iter_mut().zip(self.limits()) {
+                *x = limit.clamp(*x);
+            }
+        }
+    }
+
+    /// Sets the state that a run begins with.
     pub fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         self.resolved(now, |now| {
             let (own, added) = x.split_at_mut(self.parts.states);

@@ -45,13 +45,15 @@ impl Kalman<'_> {
             && self.settings.method == Method::Points
     }
 
-    /// Returns whether lanes can hold this filter beside another: of one twin, with as many rows, and the same ones missing.
+    /// Returns whether lanes can hold this filter beside another: of one twin that begins at the first row, with as many rows, and the same ones
+    /// missing.
     pub(super) fn fits_beside(&self, other: &Self) -> bool {
         let is_same = std::ptr::eq(self, other);
         is_same
             || self.twin.is(&other.twin)
                 && self.settings.method == other.settings.method
                 && self.record.samples() == other.record.samples()
+                && self.twin.begins().is_none()
                 && !(self.gaps || other.gaps)
     }
 }
