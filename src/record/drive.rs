@@ -56,8 +56,9 @@ impl Drive {
         Self::new(dt, signal(inputs)?)
     }
 
-    /// A drive with one row of `inputs` at each of `times`, in seconds on the record's own clock. Times increase; their steps may vary.
-    /// Steps that are the same to 1e-3 become one step Δt, else Δt is the median step.
+    /// A drive with one row of `inputs` at each of `times`, in seconds on the record's own clock. Times do not decrease; their steps may vary.
+    /// Steps that are the same to 1e-3 become one step Δt, else Δt is the median step. Rows of one time are replicates: readings of one
+    /// state, which have the same inputs.
     ///
     /// ```
     /// use truetwin::record::{Drive, Signal};
@@ -72,27 +73,40 @@ impl Drive {
         if times.len() < 2 {
             return Err(RecordError::Empty);
         }
+        let mut steps = vec![];
         for (k, pair) in times.windows(2).enumerate() {
             let step = pair[1] - pair[0];
             // Also where a time is NaN.
-            if !(step > 0.0 && step.is_finite()) {
+            if !(step >= 0.0 && step.is_finite()) {
                 return Err(RecordError::TimeOrder {
                     sample: k + 1,
                     time: pair[1],
                     before: pair[0],
                 });
             }
+            if step == 0.0 {
+                check_replicate(&inputs, k + 1)?;
+                continue;
+            }
             if !step.is_normal() {
                 return Err(RecordError::Step(step));
             }
+            steps.push(step);
+        }
+        if steps.is_empty() {
+            return Err(RecordError::TimeOrder {
+                sample: 1,
+                time: times[1],
+                before: times[0],
+            });
         }
         let (first, last) = (times[0], times[times.len() - 1]);
-        let dt = (last - first) / (times.len() - 1) as f64;
+        let dt = (last - first) / steps.len() as f64;
+        let is_repeated = steps.len() + 1 < times.len();
         let mut drive = Self::new(dt, inputs)?.beginning_at(first);
         let off = |(k, t): (usize, &f64)| (t - first - k as f64 * dt).abs() > UNIFORM * dt;
-        if times.iter().enumerate().any(off) {
+        if is_repeated || times.iter().enumerate().any(off) {
             drive.times = Some(times.into());
-            let mut steps: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
             let middle = (steps.len() - 1) / 2;
             drive.dt = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         }
@@ -161,7 +175,12 @@ impl Drive {
             if after >= times.len() {
                 return self.inputs[[i, j]];
             }
-            let share = ((t - times[i]) / (times[after] - times[i])).clamp(0.0, 1.0);
+            let step = times[after] - times[i];
+            let share = if step > 0.0 {
+                ((t - times[i]) / step).clamp(0.0, 1.0)
+            } else {
+                1.0
+            };
             (1.0 - share) * self.inputs[[i, j]] + share * self.inputs[[after, j]]
         };
         self.with_inputs(Signal::from_shape_fn(self.inputs.dim(), value))
@@ -177,12 +196,35 @@ impl Drive {
         self.dt
     }
 
-    /// Step from sample k to the next, in seconds; Δt after the last.
+    /// Step from sample k to the next, in seconds, 0 to a replicate; Δt after the last.
     pub fn step(&self, k: usize) -> f64 {
         match &self.times {
             Some(times) if k + 1 < times.len() => times[k + 1] - times[k],
             _ => self.dt,
         }
+    }
+
+    /// Returns whether the next row is another reading of the state of row k.
+    #[inline]
+    pub(crate) fn is_repeated(&self, k: usize) -> bool {
+        match &self.times {
+            None => false,
+            Some(times) => k + 1 < times.len() && times[k + 1] == times[k],
+        }
+    }
+
+    /// Number of rows that have the time of the row before them.
+    pub(crate) fn replicates(&self) -> usize {
+        (0..self.samples()).filter(|&k| self.is_repeated(k)).count()
+    }
+
+    /// Returns whether steps between different times vary.
+    pub(crate) fn steps_vary(&self) -> bool {
+        let varies = |k| {
+            let step = self.step(k);
+            step > 0.0 && (step - self.dt).abs() > UNIFORM * self.dt
+        };
+        self.times.is_some() && (0..self.samples()).any(varies)
     }
 
     /// Returns `true` if all steps are Δt.
@@ -233,6 +275,20 @@ impl Drive {
         self.inputs
             .as_slice()
             .map_or(&[], |all| &all[k * m..(k + 1) * m])
+    }
+}
+
+/// Checks that a row has the inputs of the one before it, which has the same time.
+fn check_replicate(inputs: &Signal, row: usize) -> Result<(), RecordError> {
+    let (own, before) = (inputs.row(row), inputs.row(row - 1));
+    match (own.iter().zip(before)).position(|(own, before)| own != before) {
+        None => Ok(()),
+        Some(j) => Err(RecordError::ReplicateInputs {
+            sample: row,
+            channel: j + 1,
+            value: own[j],
+            before: before[j],
+        }),
     }
 }
 
@@ -313,13 +369,32 @@ mod tests {
         assert_eq!((other.time(2), other.input(3)), (drive.time(2), &[1.0][..]));
         assert!(drive.with_inputs(Signal::ones((5, 1))).is_err());
         for times in [
-            [0.0, 1.0, 1.0],
+            [0.0, 1.0, 0.5],
+            [1.0, 1.0, 1.0],
             [0.0, f64::NAN, 2.0],
             [0.0, 1.0, f64::INFINITY],
         ] {
             let error = Drive::with_times(&times, Signal::zeros((3, 0))).unwrap_err();
             assert!(error.to_string().contains("time must increase"), "{error}");
         }
+    }
+
+    /// Rows of one time are readings of one state, on which no other input acts.
+    #[test]
+    fn rows_of_one_time_are_replicates() {
+        let times = [3.0, 3.0, 3.5, 3.5, 3.5, 4.0];
+        let mut inputs = Signal::from_shape_fn((6, 1), |(k, _)| times[k]);
+        let drive = Drive::with_times(&times, inputs.clone()).unwrap();
+        assert_eq!((drive.dt(), drive.replicates()), (0.5, 3));
+        assert!(!drive.is_uniform());
+        let repeated: Vec<bool> = (0..6).map(|k| drive.is_repeated(k)).collect();
+        assert_eq!(repeated, [true, false, true, true, false, false]);
+        inputs[[4, 0]] = 9.0;
+        let error = Drive::with_times(&times, inputs).unwrap_err().to_string();
+        let expected = "input 1 is 9, and 3.5 in the row before, which has the same time;";
+        assert!(error.starts_with(expected), "{error}");
+        let late = drive.late(0.2).unwrap();
+        assert!(late.inputs().iter().all(|u| u.is_finite()));
     }
 
     #[test]

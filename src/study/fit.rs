@@ -59,6 +59,7 @@ impl Study {
         for record in records {
             self.check_channels(record)?;
         }
+        Record::check_outputs(records, &self.twin.signals().outputs)?;
         let clock = Instant::now();
         let study = self.for_records(records)?;
         let effects = study.added_effects()?;
@@ -111,6 +112,10 @@ impl Study {
                 .map(|(name, ..)| name)
                 .collect(),
             factors: declared.map(|(name, _, factor)| (name, factor)).collect(),
+            wide: (starts.clone())
+                .filter(|(_, level)| !matches!(level, StartLevel::Declared { std: 0.0, .. }))
+                .map(|(name, _)| name.clone())
+                .collect(),
             starts: starts.map(|(name, _)| name.clone()).collect(),
         }
     }

@@ -195,7 +195,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         for i in 0..self.order.rows() {
             self.measure(i, &mut state, &mut root, sink)?;
             if i >= self.order.before && i + 1 < self.order.rows() {
-                self.carry(i - self.order.before, &mut state, &mut root, sink);
+                self.go_on(i - self.order.before, &mut state, &mut root, sink);
             }
         }
         let total = self.update.likelihood.total();
@@ -216,14 +216,14 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 let mut state = FilterState::zero(n);
                 state.set(belief);
                 self.go_to(k, &state);
-                self.carry(k, &mut state, &mut root, sink);
+                self.go_on(k, &mut state, &mut root, sink);
                 (k + 1, state)
             }
             None => (0, self.start()),
         };
         for k in first..to {
             self.measure(k, &mut state, &mut root, sink)?;
-            self.carry(k, &mut state, &mut root, sink);
+            self.go_on(k, &mut state, &mut root, sink);
         }
         Ok(())
     }
@@ -379,6 +379,24 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             return (self.update).apply_present(&row, root, outputs, (mean, cov));
         }
         (self.update).apply(&row, root, outputs, (mean, cov))
+    }
+
+    /// Carries the state from row k to the next, unless that is another reading of it. Filters side by side have the same replicates.
+    #[inline(always)]
+    fn go_on<K: Sink<N> + ?Sized>(
+        &mut self,
+        k: usize,
+        state: &mut FilterState<S, N>,
+        root: &mut Root<S::Matrix<N>>,
+        sink: &mut K,
+    ) {
+        if !self.jobs[0].acting.stands(k) {
+            return self.carry(k, state, root, sink);
+        }
+        if sink.wants_carried() {
+            let belief = state.belief(self.size.states());
+            sink.carried(k, belief, belief.cov);
+        }
     }
 
     /// Carries the state from row k to the next.

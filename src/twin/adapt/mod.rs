@@ -46,10 +46,10 @@ pub(crate) fn adapt(base: Twin, adaptation: &Adaptation, step: f64) -> Result<Tw
     twin.with_space(|space| rebox(space, adaptation))
 }
 
-/// The twin begun at known states, each within its limits; `None` for a black box.
-pub(crate) fn begun(twin: &Twin, states: &[f64], step: f64) -> Option<Twin> {
+/// The twin begun at known states, each within its limits; a black box as it is.
+pub(crate) fn begun(twin: &Twin, states: &[f64], step: f64) -> Result<Twin, TwinError> {
     let Twin::Equations(base) = twin else {
-        return None;
+        return Ok(twin.clone());
     };
     let names = base.outline().states.into_iter().map(|state| state.name);
     let start = (names.zip(base.limits()).zip(states))
@@ -61,8 +61,8 @@ pub(crate) fn begun(twin: &Twin, states: &[f64], step: f64) -> Option<Twin> {
         ..Adaptation::default()
     };
     // They are those of the first row, wherever the twin's own start belongs.
-    let begun = adapt(twin.clone(), &adaptation, step).ok()?;
-    Some(begun.with([], vec![TwinPart::Begins(None)]))
+    let begun = adapt(twin.clone(), &adaptation, step)?;
+    Ok(begun.with([], vec![TwinPart::Begins(None)]))
 }
 
 fn check_black_box(adaptation: &Adaptation) -> Result<(), TwinError> {
@@ -236,7 +236,11 @@ fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(),
     for (index, _, bounds) in indexed("bounds", &adaptation.bounds, &names)? {
         parameters[index].bounds = bounds;
     }
-    parameters.check()
+    // A study may hold all parameters.
+    match parameters.is_empty() {
+        true => Ok(()),
+        false => parameters.check(),
+    }
 }
 
 /// Holds the named parameters of a twin; θ is shorter by them.

@@ -43,14 +43,14 @@ const SAME: f64 = 1e-6;
 
 /// Steps from the start to the first row of a drive, of Δt but for a shorter first one.
 #[derive(Debug, Clone, Copy)]
-struct Before {
+struct LeadIn {
     begun: f64,
     steps: usize,
     /// Length of the first step.
     first: f64,
 }
 
-impl Before {
+impl LeadIn {
     /// From a start at this time; an error where it is after the first row, or too long before it.
     fn of(drive: &Drive, begun: f64) -> Result<Self, String> {
         let (first_row, dt) = (drive.first_time(), drive.dt());
@@ -84,12 +84,12 @@ pub(crate) struct Acting<'d> {
     hold: Hold,
     /// All of θ, held entries too.
     theta: Theta,
-    before: Before,
+    before: LeadIn,
 }
 
 /// Checks that the start of a twin does not belong to a time after the first row of a drive.
 pub(crate) fn check_start(twin: &Composed, drive: &Drive) -> Result<(), String> {
-    (twin.begins()).map_or(Ok(()), |begun| Before::of(drive, begun).map(drop))
+    (twin.begins()).map_or(Ok(()), |begun| LeadIn::of(drive, begun).map(drop))
 }
 
 impl<'d> Acting<'d> {
@@ -101,7 +101,7 @@ impl<'d> Acting<'d> {
         };
         let begun = twin.begins().unwrap_or(drive.first_time());
         Ok(Self {
-            before: Before::of(&drive, begun).map_err(SimulationError::fatal)?,
+            before: LeadIn::of(&drive, begun).map_err(SimulationError::fatal)?,
             drive,
             hold: twin.stepping().hold,
             theta: twin.complete(theta),
@@ -114,7 +114,7 @@ impl<'d> Acting<'d> {
             drive: Cow::Borrowed(drive),
             hold,
             theta: Theta::from_slice(theta),
-            before: Before {
+            before: LeadIn {
                 begun: drive.first_time(),
                 steps: 0,
                 first: drive.dt(),
@@ -147,6 +147,12 @@ impl<'d> Acting<'d> {
         now
     }
 
+    /// Returns whether row k + 1 is another reading of the state of row k, to which nothing moves.
+    #[inline(always)]
+    pub fn stands(&self, k: usize) -> bool {
+        self.drive.is_repeated(k)
+    }
+
     /// Number of samples.
     pub(super) fn samples(&self) -> usize {
         self.drive.samples()
@@ -174,6 +180,10 @@ impl<'d> Acting<'d> {
     pub fn go_to<'a>(&'a self, k: usize, now: &mut Now<'a>) {
         let drive = self.drive.as_ref();
         (now.t, now.dt, now.u) = (drive.own_time(k), drive.step(k), drive.input(k));
+        if now.dt == 0.0 {
+            // Nothing moves to a replicate; what is asked here is asked at a usual step.
+            now.dt = drive.dt();
+        }
         if self.hold != Hold::Zero {
             let next = drive.input((k + 1).min(drive.samples() - 1));
             now.between = Some(Between {
@@ -313,7 +323,9 @@ pub(super) fn simulate(
         if !y.iter().all(|v| v.is_finite()) {
             return Err(SimulationError::Diverged { at: now.t });
         }
-        carry(&now, &q, &mut x)?;
+        if !acting.stands(k) {
+            carry(&now, &q, &mut x)?;
+        }
     }
     Signal::from_shape_vec((samples, p), outputs)
         .map_err(|error| SimulationError::Fatal(error.into()))
