@@ -72,7 +72,7 @@ impl Report<'_> {
             twin: self.study.name().into(),
             verdict: answer.verdict,
             detection,
-            warnings: self.warnings(records, &parameters)?,
+            warnings: self.warnings(records, &parameters),
             residuals: (records.iter().zip(filtered.into_iter().flatten()))
                 .filter_map(|(record, filtered)| {
                     Record::new(record.drive().clone(), filtered.standardised).ok()
@@ -117,14 +117,10 @@ impl Report<'_> {
     }
 
     /// Lists what makes the diagnosis doubtful.
-    fn warnings(
-        &self,
-        records: &[Record],
-        parameters: &[FittedParameter],
-    ) -> Result<Vec<Warning>, StudyError> {
+    fn warnings(&self, records: &[Record], parameters: &[FittedParameter]) -> Vec<Warning> {
         let twin = self.study.twin();
         let beliefs = self.watch.settings.beliefs(self.study);
-        let elsewhere = start_elsewhere(twin, records, &beliefs)?;
+        let elsewhere = start_elsewhere(twin, records, &beliefs);
         let mut all = warnings(
             twin,
             records,
@@ -134,7 +130,7 @@ impl Report<'_> {
             self.found.evidence.searched(),
         );
         all.extend(elsewhere.map(|start| Warning::elsewhere(&start, records.len())));
-        Ok(all)
+        all
     }
 
     /// Returns whether the answer names places and effects of a structural gap.

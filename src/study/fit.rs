@@ -112,6 +112,10 @@ impl Study {
                 .map(|(name, ..)| name)
                 .collect(),
             factors: declared.map(|(name, _, factor)| (name, factor)).collect(),
+            estimated: (self.file.start.iter())
+                .filter(|(_, level)| matches!(level, StartLevel::Estimate))
+                .map(|(name, _)| name.clone())
+                .collect(),
             wide: (starts.clone())
                 .filter(|(_, level)| !matches!(level, StartLevel::Declared { std: 0.0, .. }))
                 .map(|(name, _)| name.clone())

@@ -38,6 +38,8 @@ pub(crate) struct Beliefs {
     pub starts: BTreeSet<String>,
     /// Those of them that are not quite known.
     pub wide: BTreeSet<String>,
+    /// States whose start is to be estimated, whatever the code says.
+    pub estimated: BTreeSet<String>,
 }
 
 /// An output whose first value is not that of the start.

@@ -53,12 +53,10 @@ pub(crate) fn start_elsewhere(
     twin: &Twin,
     records: &[Record],
     beliefs: &Beliefs,
-) -> Result<Option<StartElsewhere>, FilterError> {
-    let Some(twin) = twin.equations() else {
-        return Ok(None);
-    };
+) -> Option<StartElsewhere> {
+    let twin = twin.equations()?;
     let theta = without_effects(&twin.outline().parameters);
-    Ok(Starts::of(twin, records, beliefs, &theta)?.elsewhere)
+    Starts::of(twin, records, beliefs, &theta).elsewhere
 }
 
 /// The twin with these noise levels in place of its own; all else stays, its start too. Levels by state, per √s, or by output; each run draws
@@ -126,7 +124,7 @@ fn measured_equations(
     let sizes: Vec<Option<f64>> = (0..outline.outputs.len()).map(size_of).collect();
     let fallback = sizes.iter().flatten().copied().fold(0.0, f64::max);
     let outputs: Vec<f64> = sizes.iter().map(|size| size.unwrap_or(fallback)).collect();
-    let starts = Starts::of(base, records, beliefs, &theta)?;
+    let starts = Starts::of(base, records, beliefs, &theta);
     let widths = |widths: &[f64]| -> Vec<Option<f64>> {
         (starts.unknown.iter().zip(widths))
             .map(|(unknown, width)| unknown.then_some(*width))

@@ -11,7 +11,7 @@ use super::level::{Beliefs, StartElsewhere};
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::math::median;
 use crate::record::Record;
-use crate::twin::{Acting, Composed, is_memory};
+use crate::twin::{Acting, Composed, Now, is_memory};
 
 /// Distance of the first row from the start, in deviations of the noise, beyond which the record began elsewhere. At half of it a right start is
 /// given up in one of eighty records; at twice of it a wrong one of ten deviations is believed.
@@ -28,20 +28,19 @@ pub(super) struct Starts {
 }
 
 impl Starts {
-    pub fn of(
-        twin: &Composed,
-        records: &[Record],
-        beliefs: &Beliefs,
-        theta: &[f64],
-    ) -> Result<Self, FilterError> {
+    pub fn of(twin: &Composed, records: &[Record], beliefs: &Beliefs, theta: &[f64]) -> Self {
         let names: Vec<String> = (twin.outline().states.into_iter())
             .map(|state| state.name)
             .collect();
-        let acting = Acting::of(twin, theta, records[0].drive())?;
-        let written = twin.written_starts(&acting.start());
+        let drive = records[0].drive();
+        let now = Now::new(drive.first_time(), drive.dt(), drive.input(0), theta);
+        let written = twin.written_starts(&now);
         let is_declared = |name: &String| beliefs.starts.contains(name);
         let mut unknown: Vec<bool> = (names.iter().zip(&written))
-            .map(|(name, written)| !(is_declared(name) || is_memory(name) || *written))
+            .map(|(name, written)| {
+                let is_said = *written && !beliefs.estimated.contains(name);
+                !(is_declared(name) || is_memory(name) || is_said)
+            })
             .collect();
         let mut elsewhere = None;
         for (r, record) in records.iter().enumerate() {
@@ -54,7 +53,7 @@ impl Starts {
                 })
                 .collect();
             let Some((output, value, expected)) =
-                contradiction((twin, &unknown), record, theta)?.filter(|_| !given_up.is_empty())
+                contradiction((twin, &unknown), record, theta).filter(|_| !given_up.is_empty())
             else {
                 continue;
             };
@@ -67,7 +66,7 @@ impl Starts {
                 states: given_up.iter().map(|&i| names[i].clone()).collect(),
             });
         }
-        Ok(Self { unknown, elsewhere })
+        Self { unknown, elsewhere }
     }
 }
 
@@ -76,17 +75,20 @@ fn contradiction(
     (twin, unknown): (&Composed, &[bool]),
     record: &Record,
     theta: &[f64],
-) -> Result<Option<(usize, f64, f64)>, FilterError> {
+) -> Option<(usize, f64, f64)> {
     let outline = twin.outline();
     let (n, p) = (outline.states.len(), outline.outputs.len());
     if twin.begins().is_some() {
         // The equations lead to the first row: what they say depends on θ.
-        return Ok(None);
+        return None;
     }
     let mut range = vec![(f64::INFINITY, f64::NEG_INFINITY); p];
     let mut noise = vec![0.0; p];
-    let mut look = |theta: &[f64]| -> Result<(), FilterError> {
-        let acting = Acting::of(twin, theta, record.drive())?;
+    let mut look = |theta: &[f64]| {
+        // A twin that does not work there says nothing.
+        let Ok(acting) = Acting::of(twin, theta, record.drive()) else {
+            return;
+        };
         let now = acting.start();
         let (mut x, mut y) = (vec![0.0; n], vec![0.0; p]);
         let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
@@ -116,9 +118,8 @@ fn contradiction(
                 }
             }
         }
-        Ok(())
     };
-    look(theta)?;
+    look(theta);
     for (j, parameter) in outline.parameters.iter().enumerate() {
         for (bound, prior) in [
             (parameter.bounds.low(), parameter.prior.low()),
@@ -126,7 +127,7 @@ fn contradiction(
         ] {
             let mut moved = theta.to_vec();
             moved[j] = if bound.is_finite() { bound } else { prior };
-            look(&moved)?;
+            look(&moved);
         }
     }
     let rows = (0..record.samples()).take_while(|&k| k == 0 || record.drive().is_repeated(k - 1));
@@ -141,11 +142,11 @@ fn contradiction(
                     .max(roughness(&values))
                     .max(record.cells()[j].sqrt());
             if (value - expected).abs() > reach {
-                return Ok(Some((j, value, expected)));
+                return Some((j, value, expected));
             }
         }
     }
-    Ok(None)
+    None
 }
 
 /// Deviation of white noise with second differences like those of a signal: an upper bound of its noise.
@@ -173,7 +174,9 @@ pub(super) fn distances(
             return Ok(None);
         };
         let mut start = vec![0.0; n];
-        let acting = Acting::of(twin, theta, record.drive())?;
+        let Ok(acting) = Acting::of(twin, theta, record.drive()) else {
+            continue;
+        };
         twin.run_to_first_row(&acting, &mut twin.workspace(), &mut start);
         for (i, distance) in all.iter_mut().enumerate() {
             let off = smoothed.means[[0, i]] - start[i];
