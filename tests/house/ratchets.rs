@@ -278,7 +278,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 152, items.collect()),
         Ratchet::new("error types", 13, errors),
-        Ratchet::new("lines of code", 49_400, lines),
+        Ratchet::new("lines of code", 49_500, lines),
         Ratchet::new("files", 414, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),

@@ -57,7 +57,7 @@ pub(crate) struct StartElsewhere {
     pub states: Vec<String>,
 }
 
-/// RecordSizes of what a record shows, from which levels are guessed.
+/// Sizes of what a record shows, from which levels are guessed.
 pub(super) struct RecordSizes {
     /// Motion of each state.
     pub states: Vec<f64>,

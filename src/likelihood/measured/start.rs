@@ -95,7 +95,7 @@ fn contradiction(
         twin.start(&now, &mut x);
         twin.observe(&now, &x, &mut y);
         twin.readout(&now, &mut y);
-        twin.noise(&now, &mut q, &mut r);
+        twin.noise(&now, &x, &mut q, &mut r);
         let mut std = vec![0.0; n];
         twin.start_deviation(&now, &mut std);
         for j in 0..p {
