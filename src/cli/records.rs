@@ -49,8 +49,10 @@ fn warn_of_outlier(path: &Path, record: &Record) {
             let there = channel.iter().filter(|value| !value.is_nan());
             let mut sizes: Vec<f64> = there.map(|value| value.abs()).collect();
             sizes.sort_unstable_by(f64::total_cmp);
+            let Some(&largest) = sizes.last() else {
+                continue;
+            };
             let usual = sizes[(NEARLY_ALL * (sizes.len() - 1) as f64) as usize];
-            let largest = sizes[sizes.len() - 1];
             if usual == 0.0 || largest <= FAR * usual {
                 continue;
             }

@@ -5,6 +5,7 @@
 use crate::estimator::EstimatorError;
 use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
+use crate::math::MathError;
 use crate::network::NetworkError;
 use crate::record::RecordError;
 use crate::setting::number;
@@ -85,6 +86,7 @@ impl Remedy for RecordError {
                 "`truetwin resample R.csv --step {} --out R2.csv`; `truetwin fit` and `truetwin diagnose` take such records",
                 number(*expected)
             ),
+            Self::Start(_) => "[start] of the study file".into(),
             Self::OneStep => "`truetwin resample R.csv --step S --out R2.csv`".into(),
             Self::Channels { .. } => "`truetwin twins` lists the twins".into(),
             Self::Columns { .. } => {
@@ -176,6 +178,9 @@ impl Remedy for EstimatorError {
                     .into()
             }
             Self::Whitening(_) => "[noise] of the study file".into(),
+            Self::Search(MathError::Start(_)) => {
+                "`truetwin fit` needs no training; if the record begins elsewhere than the twin, [start] of the study file, and pretrain again".into()
+            }
             _ => return None,
         })
     }
@@ -185,7 +190,8 @@ impl Remedy for EstimatorError {
             Self::Study(error) => error.cause(),
             Self::Feature(error) => error.cause(),
             Self::Network(error) => error.cause(),
-            Self::Cancelled(_) | Self::Search(_) => Cause::Internal,
+            // A search that a record leaves no start for is no fault of the program.
+            Self::Cancelled(_) | Self::Search(MathError::Fatal(_)) => Cause::Internal,
             Self::Simulation(_) | Self::Rejected(_) | Self::Hopeless { .. } | Self::Inputs(_) => {
                 Cause::Study
             }

@@ -18,12 +18,14 @@ use super::quantify::share::{Measures, shrinkage};
 use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
+use crate::fit::Warning;
 use crate::fit::posterior::{PosteriorSample, posterior};
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::Part;
 use crate::likelihood::kalman::recoverable;
+use crate::likelihood::start_elsewhere;
 use crate::progress::{Progress, Stage};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
@@ -74,14 +76,7 @@ impl Report<'_> {
             verdict: answer.verdict,
             detection,
             check,
-            warnings: warnings(
-                self.study.twin(),
-                records,
-                self.validation.map(|records| &records[0]),
-                &parameters,
-                base.step.is_some(),
-                self.found.evidence.searched(),
-            ),
+            warnings: self.warnings(records, &parameters),
             residuals: (records.iter().zip(filtered.into_iter().flatten()))
                 .filter_map(|(record, filtered)| {
                     Record::new(record.drive().clone(), filtered.standardised).ok()
@@ -123,6 +118,23 @@ impl Report<'_> {
             passes: base.model.problem.passes().so_far(),
             seconds: 0.0,
         })
+    }
+
+    /// Lists what makes the diagnosis doubtful.
+    fn warnings(&self, records: &[Record], parameters: &[FittedParameter]) -> Vec<Warning> {
+        let twin = self.study.twin();
+        let beliefs = self.watch.settings.beliefs(self.study);
+        let elsewhere = start_elsewhere(twin, records, &beliefs);
+        let mut all = warnings(
+            twin,
+            records,
+            self.validation.map(|records| &records[0]),
+            parameters,
+            self.found.evidence.base.step.is_some(),
+            self.found.evidence.searched(),
+        );
+        all.extend(elsewhere.map(|start| Warning::elsewhere(&start, records.len())));
+        all
     }
 
     /// Returns whether the answer names places and effects of a structural gap.

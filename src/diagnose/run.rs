@@ -117,6 +117,7 @@ fn check(
             });
         }
     }
+    Record::check_outputs(records, &study.twin().signals().outputs)?;
     let alpha = settings.alpha;
     SettingError::unless(
         alpha > 0.0 && alpha < 1.0,

@@ -3,6 +3,7 @@
 use super::certificate::Side;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
+use crate::likelihood::StartElsewhere;
 use crate::math::{is_constant, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
 use crate::setting::number;
@@ -16,7 +17,7 @@ pub(crate) const DIVERGES: &str = "free-run-diverges";
 pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 17] = [
+const REMEDIES: [(&str, &str); 18] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",
@@ -68,6 +69,10 @@ const REMEDIES: [(&str, &str); 17] = [
         "widen the prior and train again, or diagnose what the twin lacks",
     ),
     ("repeated-record", "give each record once"),
+    (
+        "start-elsewhere",
+        "declare the start of these records, or the time that it belongs to",
+    ),
     ("step-matters", "fit or train again with such a step"),
     (
         "validation-is-record",
@@ -107,6 +112,26 @@ impl Warning {
             "step-matters",
             format!("the step{of} is {coarse}"),
         ))
+    }
+
+    /// A start that is not that of a record, of so many.
+    pub(crate) fn elsewhere(start: &StartElsewhere, records: usize) -> Self {
+        let StartElsewhere { output, .. } = start;
+        let which = match records {
+            1 => "the record".to_owned(),
+            _ => format!("record {}", start.record + 1),
+        };
+        let unit = match output.unit.as_str() {
+            "" | "-" | "1" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        let [value, expected] = [start.value, start.expected].map(|v| number(three_digits(v)));
+        let what = format!(
+            "{which} begins at {} = {value}{unit}, the start of {} is {expected}{unit} there: it is taken as unknown",
+            output.name,
+            start.states.join(", ")
+        );
+        Self::new("start-elsewhere", what)
     }
 
     /// Channels that have one value in all records.
@@ -165,6 +190,13 @@ impl<'a> Doubts<'a> {
             "below-the-twin-alone",
             format!("the fit is {less} nats less likely than with its effects off"),
         );
+    }
+
+    /// Warns of a start that is not that of the records.
+    pub fn start(&mut self, start: Option<&StartElsewhere>) {
+        let records = self.problem.records.len();
+        self.all
+            .extend(start.map(|start| Warning::elsewhere(start, records)));
     }
 
     /// Warns of a search that has not arrived.

@@ -2,7 +2,7 @@
 
 use super::outcome::FittedStart;
 use super::problem::Problem;
-use crate::likelihood::kalman::States;
+use crate::likelihood::kalman::{FilterError, States};
 use crate::record::Signal;
 use crate::twin::begun;
 
@@ -27,20 +27,28 @@ pub(crate) fn starts(problem: &Problem, smoothed: &[States]) -> Vec<FittedStart>
 }
 
 /// Noise-free runs from the start given the record; none where a run diverges.
+///
+/// # Errors
+///
+/// A start that the twin cannot have, a simulator that does not work.
 pub(crate) fn free_runs(
     problem: &Problem,
     theta: &[f64],
     smoothed: &[States],
-) -> Vec<Option<Signal>> {
+) -> Result<Vec<Option<Signal>>, FilterError> {
     (problem.records.iter().enumerate())
         .map(|(r, record)| {
             let own = problem.of_record(r, theta);
-            let twin = match smoothed.get(r) {
-                Some(smoothed) => begun(&problem.twin, &smoothed.first(), record.drive().dt())?,
+            let twin = match smoothed.get(r).map(States::first) {
+                Some(first) if first.iter().any(|x| !x.is_finite()) => return Ok(None),
+                Some(first) => begun(&problem.twin, &first, record.drive().dt())?,
                 None => problem.twin.clone(),
             };
-            let run = twin.free_run(&own, record.drive()).ok()?;
-            run.iter().all(|v| v.is_finite()).then_some(run)
+            match twin.free_run(&own, record.drive()) {
+                Ok(run) => Ok(run.iter().all(|v| v.is_finite()).then_some(run)),
+                Err(error) if error.costs_one_run() => Ok(None),
+                Err(error) => Err(error.into()),
+            }
         })
         .collect()
 }

@@ -53,7 +53,7 @@ pub struct Fit {
     pub evidence: Option<FitEvidence>,
     /// End of the search.
     pub convergence: Convergence,
-    /// Errors of each output.
+    /// Errors of each output, over the records that have it.
     pub errors: Vec<OutputErrors>,
     /// Reasons for doubt.
     pub warnings: Vec<Warning>,

@@ -56,7 +56,7 @@ pub(crate) fn run(
     let spread = FitIntervals::new(&problem, &fitted, &draws.thetas, settings.level);
     let (parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
     let smoothed = problem.smoothed(&fitted.theta)?;
-    let free_runs = free_runs(&problem, &fitted.theta, &smoothed);
+    let free_runs = free_runs(&problem, &fitted.theta, &smoothed)?;
     let starts = starts(&problem, &smoothed);
     let own = measured.twin.parameters().len() - levels.len();
     let start = |state: &str| {
@@ -75,6 +75,7 @@ pub(crate) fn run(
     let mut doubts = Doubts::new(&problem, &fitted.theta);
     doubts.below(without.filter(|_| !ends), fitted.log_likelihood);
     doubts.search(&convergence);
+    doubts.start(measured.elsewhere.as_ref());
     doubts.bounds(&parameters, &noise_levels, &off);
     doubts.runs(&errors);
     doubts.records(free_runs.iter().all(Option::is_some));
@@ -176,7 +177,7 @@ fn values(
     (parameters, noise)
 }
 
-/// Errors of each output at the full θ.
+/// Errors of each output that the records have at the full θ.
 pub(super) fn errors(
     problem: &Problem,
     theta: &[f64],
@@ -187,8 +188,12 @@ pub(super) fn errors(
     let rms = |values: &[f64]| {
         (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
     };
-    Ok((outputs.iter().enumerate())
-        .map(|(j, output)| {
+    // A record may lack a sensor.
+    let there = |j: &usize| problem.records.iter().any(|record| record.has_output(*j));
+    Ok((0..outputs.len())
+        .filter(there)
+        .map(|j| {
+            let output = &outputs[j];
             let (mut one_step, mut free, mut all) = (vec![], vec![], vec![]);
             for (r, record) in problem.records.iter().enumerate() {
                 for k in 0..record.samples() {

@@ -15,7 +15,7 @@ use crate::twin::Role;
 pub struct FitScore {
     /// Mean log density of a row given those before it, in nats; the first row, which only the start predicts, is left out.
     pub log_score: f64,
-    /// Errors of each output.
+    /// Errors of each output that the record has.
     pub errors: Vec<OutputErrors>,
     /// Free run beside the record; none where it diverges.
     pub free_run: Option<Signal>,
@@ -52,7 +52,7 @@ pub(crate) fn score(
         return Ok(None);
     };
     let smoothed = problem.smoothed(&theta)?;
-    let mut runs = free_runs(&problem, &theta, &smoothed);
+    let mut runs = free_runs(&problem, &theta, &smoothed)?;
     let densities = &filtered[0].log_densities[1..];
     Ok(Some(FitScore {
         log_score: densities.iter().sum::<f64>() / densities.len().max(1) as f64,

@@ -104,7 +104,7 @@ fn eigenvalues(twin: &Twin, theta: &[f64], record: &Record) -> Option<Vec<Comple
     let acting = Acting::of(twin, theta, record.drive()).ok()?;
     let now = acting.at(0);
     let (mut x, mut rates) = (vec![0.0; n], vec![0.0; n]);
-    twin.start(&now, &mut x);
+    twin.run_to_first_row(&acting, &mut twin.workspace(), &mut x);
     twin.drift(&now, &x, &mut rates);
     let mut jacobian = DMatrix::zeros(n, n);
     for j in 0..n {

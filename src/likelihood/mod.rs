@@ -6,6 +6,8 @@ mod measured;
 mod of_twin;
 mod time_constants;
 
-pub(crate) use measured::{Beliefs, Level, Measured, measured, with_levels};
+pub(crate) use measured::{
+    Beliefs, Level, Measured, StartElsewhere, measured, start_elsewhere, with_levels,
+};
 pub(crate) use of_twin::{Likelihood, likelihood_of};
 pub(crate) use time_constants::time_constants;

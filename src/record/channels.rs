@@ -123,9 +123,18 @@ impl Columns {
         signals: Option<&Signals>,
     ) -> Result<Vec<Option<String>>, String> {
         let mut names: Vec<Option<String>> = vec![None; header.len()];
+        let lacks = signals.is_some_and(|signals| signals.outputs.len() > 1);
         for (key, column) in &self.0 {
             let usual = usual_name(key, signals).ok_or_else(|| unknown_key(key, signals))?;
             let at = (header.iter()).position(|name| name == column);
+            let has_other = |key: &String| {
+                let is_output = |key| usual_name(key, signals).is_some_and(|n| n.starts_with('y'));
+                is_output(key.as_str()) && header.contains(&self.0[key].as_str())
+            };
+            // A record may lack a sensor that others have.
+            if at.is_none() && usual.starts_with('y') && lacks && self.0.keys().any(has_other) {
+                continue;
+            }
             let at = at.ok_or_else(|| {
                 let near = did_you_mean(column, header);
                 format!(
@@ -150,7 +159,7 @@ impl Columns {
                 ));
             }
         }
-        for letter in ["u", "y"] {
+        for letter in ["u", "y"].into_iter().filter(|l| *l == "u" || !lacks) {
             let given: Vec<&String> = (names.iter().flatten())
                 .filter(|name| name.starts_with(letter))
                 .collect();
@@ -251,6 +260,8 @@ mod tests {
         let mixed = names("t=time,upper=A,y2=B", "B,t,time,u,A,note,y1").unwrap();
         assert_eq!(mixed, ["y2", "", "t", "u", "y1", "", ""]);
         assert_eq!(names("", "t,u,note").unwrap(), ["t", "u", "note"]);
+        assert_eq!(names("lower=a", "t,a").unwrap(), ["t", "y2"]);
+        assert_eq!(names("lower=a,upper=b", "t,a").unwrap(), ["t", "y2"]);
     }
 
     #[test]
@@ -269,7 +280,6 @@ mod tests {
             ("t=a,u=a", "a,b", "column \"a\" is to be both"),
             ("u=a,pump=b", "a,b", "two columns are to be u"),
             ("upper=a,y1=b", "a,b", "two columns are to be"),
-            ("lower=a", "t,a", "no column is given for y1"),
             ("t=a", "a,a", "column \"a\" appears twice"),
             ("t=a,t=b", "a,b", "t is given twice"),
             ("time", "a,b", "not name=column"),

@@ -2,7 +2,7 @@
 //!
 //! A header, then one row a sample: `t` in seconds or as time stamps, increasing; inputs `u` or `u1,u2,…`; outputs `y` or `y1,y2,…`; other
 //! names by [`Columns`]. Columns are separated by commas, semicolons or tabs. An output that was not measured is an empty cell, `nan` or
-//! `NA`. Steps that are the same to 1e-3 count as one. Rows are counted as an editor counts lines: the header is row 1.
+//! `NA`; its column may be left out where the twin is known. Steps that are the same to 1e-3 count as one. Rows of one time are replicates. Rows are counted as an editor counts lines: the header is row 1.
 
 use super::channels::{Columns, columns};
 use super::parquet;
@@ -126,8 +126,8 @@ fn csv_text(drive: &Drive, outputs: &Signal) -> String {
     let mut text = header.join(",") + "\n";
     for k in 0..drive.samples() {
         let t = match drive.is_uniform() {
-            true => rounded_time(drive.time(k), drive.dt()),
-            false => drive.time(k),
+            true => rounded_time(drive.own_time(k), drive.dt()),
+            false => drive.own_time(k),
         };
         text += &t.to_string();
         for value in drive.input(k).iter().chain(outputs.row(k)) {
@@ -163,6 +163,7 @@ fn rounded_time(t: f64, dt: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::Quantity;
     use crate::storage::untrusted::MOST_NUMBERS;
 
     fn written(text: &str) -> Result<Record, RecordError> {
@@ -229,7 +230,7 @@ mod tests {
 
     #[test]
     fn time_must_increase() {
-        for times in ["0.5", "1", "-1"] {
+        for times in ["0.5", "-1"] {
             let text = message(&format!("t,y\n0,1\n1,1\n{times},1\n"));
             assert!(text.contains("row 4, column t"), "{text}");
         }
@@ -246,6 +247,61 @@ mod tests {
         assert_eq!((uneven.drive().dt(), uneven.drive().time(3)), (1.0, 4.0));
     }
 
+    /// Rows of one time survive the file; other inputs there are refused by row and column.
+    #[test]
+    fn replicates_are_readings_of_one_state() {
+        let text = "t,u,y\n10,1,1.5\n10,1,1.6\n11,2,1.7\n";
+        let record = written(text).unwrap();
+        assert_eq!(record.drive().replicates(), 1);
+        assert_eq!(record_csv_text(&record), text);
+        let text = message("t,u1,u2,y\n0,1,2,3\n0,1,5,3\n1,1,5,3\n");
+        assert!(
+            text.contains("row 3, column u2: input 2 is 5, and 2 in"),
+            "{text}"
+        );
+    }
+
+    /// A record may lack outputs of the twin if it has another one.
+    #[test]
+    fn a_sensor_may_be_missing_altogether() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.csv");
+        let signals = Signals {
+            inputs: vec![Quantity::new("u", "V")],
+            outputs: ["upper", "middle", "lower"]
+                .map(|name| Quantity::new(name, "m"))
+                .into(),
+        };
+        let read = |columns: &str, text: &str| {
+            std::fs::write(&path, text).unwrap();
+            let columns = match columns {
+                "" => Columns::default(),
+                columns => columns.parse().unwrap(),
+            };
+            let reader = RecordReader::new(columns, Some(signals.clone()));
+            reader.for_twin("tanks").record(&path)
+        };
+        let there = |columns, text| {
+            let record = read(columns, text).unwrap();
+            [0, 1, 2].map(|j| record.has_output(j))
+        };
+        assert_eq!(
+            there("", "t,u,y1,y3\n0,1,2,3\n1,1,2,3\n"),
+            [true, false, true]
+        );
+        assert_eq!(there("", "t,u,lower\n0,1,2\n1,1,2\n"), [false, false, true]);
+        let columns = "upper=A,middle=B,lower=C";
+        assert_eq!(
+            there(columns, "t,u,C,A\n0,1,2,3\n1,1,2,3\n"),
+            [true, false, true]
+        );
+        let refused = |text| read("", text).unwrap_err().to_string();
+        let text = refused("t,u,y1,y4\n0,1,2,3\n1,1,2,3\n");
+        assert!(text.contains("column \"y4\""), "{text}");
+        let text = refused("t,u,y\n0,1,2\n1,1,2\n");
+        assert!(text.contains("1 outputs, the twin has 3"), "{text}");
+    }
+
     #[test]
     fn missing_outputs_survive_the_file() {
         let text = "t,u,y1,y2\n0,1,1.5,\n0.25,2,,\n1,3,,-0.5\n";
@@ -253,8 +309,8 @@ mod tests {
         assert_eq!(record.missing(), 4);
         assert_eq!(record_csv_text(&record), text);
         assert_eq!(written(text).unwrap(), record);
-        let text = message("t,y1,y2\n0,1,\n1,1,\n2,1,nan\n");
-        assert!(text.contains("output 2 has no value"), "{text}");
+        let one = written("t,y1,y2\n0,1,\n1,1,\n2,1,nan\n").unwrap();
+        assert!(one.has_output(0) && !one.has_output(1));
         let text = message("t,y\n0,\n1,1\n2,\n");
         assert!(text.contains("1 rows with a measured output"), "{text}");
     }

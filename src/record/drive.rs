@@ -21,13 +21,15 @@ const UNIFORM: f64 = 1e-3;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
     dt: f64,
+    /// Time of the first row on the record's own clock, in seconds.
+    first_time: f64,
     inputs: Signal,
-    /// Seconds from the first sample, one a row, where steps vary.
+    /// Times on the record's own clock, one a row, where steps vary.
     times: Option<Arc<[f64]>>,
 }
 
 impl Drive {
-    /// A drive of step Δt = `dt` seconds with `inputs` (N × channels).
+    /// A drive of step Δt = `dt` seconds with `inputs` (N × channels), its first row at 0 s.
     pub fn new(dt: f64, inputs: Signal) -> Result<Self, RecordError> {
         if !(dt > 0.0 && dt.is_normal()) {
             return Err(RecordError::Step(dt));
@@ -43,6 +45,7 @@ impl Drive {
         };
         Ok(Self {
             dt,
+            first_time: 0.0,
             inputs,
             times: None,
         })
@@ -53,13 +56,15 @@ impl Drive {
         Self::new(dt, signal(inputs)?)
     }
 
-    /// A drive with one row of `inputs` at each of `times`, in seconds. Times increase; their steps may vary. Steps that
-    /// are the same to 1e-3 become one step Δt, else Δt is the median step.
+    /// A drive with one row of `inputs` at each of `times`, in seconds on the record's own clock. Times do not decrease; their steps may vary.
+    /// Steps that are the same to 1e-3 become one step Δt, else Δt is the median step. Rows of one time are replicates: readings of one
+    /// state, which have the same inputs.
     ///
     /// ```
     /// use truetwin::record::{Drive, Signal};
-    /// let drive = Drive::with_times(&[0.0, 0.1, 0.4, 0.5], Signal::ones((4, 1)))?;
-    /// assert_eq!((drive.time(2), drive.dt()), (0.4, 0.1));
+    /// let drive = Drive::with_times(&[2.0, 2.1, 2.4, 2.5], Signal::ones((4, 1)))?;
+    /// assert_eq!((drive.first_time(), drive.own_time(2)), (2.0, 2.4));
+    /// assert!((drive.time(2) - 0.4).abs() < 1e-12);
     /// assert!((drive.step(1) - 0.3).abs() < 1e-12);
     /// # Ok::<(), truetwin::record::RecordError>(())
     /// ```
@@ -68,31 +73,63 @@ impl Drive {
         if times.len() < 2 {
             return Err(RecordError::Empty);
         }
+        let mut steps = vec![];
         for (k, pair) in times.windows(2).enumerate() {
             let step = pair[1] - pair[0];
             // Also where a time is NaN.
-            if !(step > 0.0 && step.is_finite()) {
+            if !(step >= 0.0 && step.is_finite()) {
                 return Err(RecordError::TimeOrder {
                     sample: k + 1,
                     time: pair[1],
                     before: pair[0],
                 });
             }
+            if step == 0.0 {
+                check_replicate(&inputs, k + 1)?;
+                continue;
+            }
             if !step.is_normal() {
                 return Err(RecordError::Step(step));
             }
+            steps.push(step);
+        }
+        if steps.is_empty() {
+            return Err(RecordError::TimeOrder {
+                sample: 1,
+                time: times[1],
+                before: times[0],
+            });
         }
         let (first, last) = (times[0], times[times.len() - 1]);
-        let dt = (last - first) / (times.len() - 1) as f64;
-        let mut drive = Self::new(dt, inputs)?;
+        let dt = (last - first) / steps.len() as f64;
+        let is_repeated = steps.len() + 1 < times.len();
+        let mut drive = Self::new(dt, inputs)?.beginning_at(first);
         let off = |(k, t): (usize, &f64)| (t - first - k as f64 * dt).abs() > UNIFORM * dt;
-        if times.iter().enumerate().any(off) {
-            drive.times = Some(times.iter().map(|t| t - first).collect());
-            let mut steps: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
+        if is_repeated || times.iter().enumerate().any(off) {
+            drive.times = Some(times.into());
             let middle = (steps.len() - 1) / 2;
             drive.dt = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         }
         Ok(drive)
+    }
+
+    /// The same drive, its first row at this time on the record's own clock, in seconds. Equations see that clock: `Now::t` of row k is
+    /// [`own_time`](Self::own_time) of k.
+    ///
+    /// ```
+    /// use truetwin::record::Drive;
+    /// let drive = Drive::autonomous(0.5, 3)?.beginning_at(100.0);
+    /// assert_eq!((drive.time(1), drive.own_time(1)), (0.5, 100.5));
+    /// # Ok::<(), truetwin::record::RecordError>(())
+    /// ```
+    #[must_use]
+    pub fn beginning_at(mut self, first_time: f64) -> Self {
+        let shift = first_time - self.first_time;
+        if let Some(times) = self.times.as_mut().filter(|_| shift != 0.0) {
+            *times = times.iter().map(|t| t + shift).collect();
+        }
+        self.first_time = first_time;
+        self
     }
 
     /// Checks that all steps are the same, as a twin needs it that is told one step.
@@ -108,6 +145,7 @@ impl Drive {
         let rows = samples.clamp(1, self.samples());
         Self {
             dt: self.dt,
+            first_time: self.first_time,
             inputs: self.inputs.slice(s![..rows, ..]).to_owned(),
             times: self.times.as_ref().map(|times| times[..rows].into()),
         }
@@ -120,6 +158,7 @@ impl Drive {
         }
         Ok(Self {
             times: self.times.clone(),
+            first_time: self.first_time,
             ..Self::new(self.dt, inputs)?
         })
     }
@@ -136,7 +175,12 @@ impl Drive {
             if after >= times.len() {
                 return self.inputs[[i, j]];
             }
-            let share = ((t - times[i]) / (times[after] - times[i])).clamp(0.0, 1.0);
+            let step = times[after] - times[i];
+            let share = if step > 0.0 {
+                ((t - times[i]) / step).clamp(0.0, 1.0)
+            } else {
+                1.0
+            };
             (1.0 - share) * self.inputs[[i, j]] + share * self.inputs[[after, j]]
         };
         self.with_inputs(Signal::from_shape_fn(self.inputs.dim(), value))
@@ -152,12 +196,35 @@ impl Drive {
         self.dt
     }
 
-    /// Step from sample k to the next, in seconds; Δt after the last.
+    /// Step from sample k to the next, in seconds, 0 to a replicate; Δt after the last.
     pub fn step(&self, k: usize) -> f64 {
         match &self.times {
             Some(times) if k + 1 < times.len() => times[k + 1] - times[k],
             _ => self.dt,
         }
+    }
+
+    /// Returns whether the next row is another reading of the state of row k.
+    #[inline]
+    pub(crate) fn is_repeated(&self, k: usize) -> bool {
+        match &self.times {
+            None => false,
+            Some(times) => k + 1 < times.len() && times[k + 1] == times[k],
+        }
+    }
+
+    /// Number of rows that have the time of the row before them.
+    pub(crate) fn replicates(&self) -> usize {
+        (0..self.samples()).filter(|&k| self.is_repeated(k)).count()
+    }
+
+    /// Returns whether steps between different times vary.
+    pub(crate) fn steps_vary(&self) -> bool {
+        let varies = |k| {
+            let step = self.step(k);
+            step > 0.0 && (step - self.dt).abs() > UNIFORM * self.dt
+        };
+        self.times.is_some() && (0..self.samples()).any(varies)
     }
 
     /// Returns `true` if all steps are Δt.
@@ -181,8 +248,23 @@ impl Drive {
             None => k as f64 * self.dt,
             Some(times) => {
                 let last = times.len() - 1;
-                times[k.min(last)] + k.saturating_sub(last) as f64 * self.dt
+                let since = times[k.min(last)] - self.first_time;
+                since + k.saturating_sub(last) as f64 * self.dt
             }
+        }
+    }
+
+    /// Time of the first row on the record's own clock, in seconds: 0 unless the record says otherwise.
+    pub fn first_time(&self) -> f64 {
+        self.first_time
+    }
+
+    /// Time of sample k on the record's own clock, in seconds; steps of Δt behind the last.
+    #[inline]
+    pub fn own_time(&self, k: usize) -> f64 {
+        match &self.times {
+            Some(times) if k < times.len() => times[k],
+            _ => self.first_time + self.time(k),
         }
     }
 
@@ -193,6 +275,20 @@ impl Drive {
         self.inputs
             .as_slice()
             .map_or(&[], |all| &all[k * m..(k + 1) * m])
+    }
+}
+
+/// Checks that a row has the inputs of the one before it, which has the same time.
+fn check_replicate(inputs: &Signal, row: usize) -> Result<(), RecordError> {
+    let (own, before) = (inputs.row(row), inputs.row(row - 1));
+    match (own.iter().zip(before)).position(|(own, before)| own != before) {
+        None => Ok(()),
+        Some(j) => Err(RecordError::ReplicateInputs {
+            sample: row,
+            channel: j + 1,
+            value: own[j],
+            before: before[j],
+        }),
     }
 }
 
@@ -260,18 +356,45 @@ mod tests {
             near(drive.time(k), time);
         }
         let even = Drive::with_times(&[1.0, 1.25, 1.5], Signal::ones((3, 1))).unwrap();
-        assert_eq!(even, Drive::new(0.25, Signal::ones((3, 1))).unwrap());
+        let expected = Drive::new(0.25, Signal::ones((3, 1))).unwrap();
+        assert_ne!(even, expected);
+        assert_eq!(even, expected.beginning_at(1.0));
+        assert_eq!((drive.own_time(2), drive.own_time(3)), (5.4, 5.5));
+        near(drive.own_time(4), 5.6);
+        let later = drive.clone().beginning_at(7.0);
+        near(later.own_time(2), 7.4);
+        near(later.step(1), 0.3);
+        assert_eq!(later.first(2).first_time(), 7.0);
         let other = drive.with_inputs(Signal::ones((4, 1))).unwrap();
         assert_eq!((other.time(2), other.input(3)), (drive.time(2), &[1.0][..]));
         assert!(drive.with_inputs(Signal::ones((5, 1))).is_err());
         for times in [
-            [0.0, 1.0, 1.0],
+            [0.0, 1.0, 0.5],
+            [1.0, 1.0, 1.0],
             [0.0, f64::NAN, 2.0],
             [0.0, 1.0, f64::INFINITY],
         ] {
             let error = Drive::with_times(&times, Signal::zeros((3, 0))).unwrap_err();
             assert!(error.to_string().contains("time must increase"), "{error}");
         }
+    }
+
+    /// Rows of one time are readings of one state, on which no other input acts.
+    #[test]
+    fn rows_of_one_time_are_replicates() {
+        let times = [3.0, 3.0, 3.5, 3.5, 3.5, 4.0];
+        let mut inputs = Signal::from_shape_fn((6, 1), |(k, _)| times[k]);
+        let drive = Drive::with_times(&times, inputs.clone()).unwrap();
+        assert_eq!((drive.dt(), drive.replicates()), (0.5, 3));
+        assert!(!drive.is_uniform());
+        let repeated: Vec<bool> = (0..6).map(|k| drive.is_repeated(k)).collect();
+        assert_eq!(repeated, [true, false, true, true, false, false]);
+        inputs[[4, 0]] = 9.0;
+        let error = Drive::with_times(&times, inputs).unwrap_err().to_string();
+        let expected = "input 1 is 9, and 3.5 in the row before, which has the same time;";
+        assert!(error.starts_with(expected), "{error}");
+        let late = drive.late(0.2).unwrap();
+        assert!(late.inputs().iter().all(|u| u.is_finite()));
     }
 
     #[test]

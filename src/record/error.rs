@@ -20,7 +20,7 @@ pub enum RecordError {
     Lengths(String),
     /// A time that does not follow the one before it.
     #[error(
-        "{} s follows {} s; time must increase: sort the rows, remove repeated ones",
+        "{} s follows {} s; time must increase: sort the rows, or give them their times",
         number(*time),
         number(*before)
     )]
@@ -32,14 +32,27 @@ pub enum RecordError {
         /// Time of the sample before.
         before: f64,
     },
-    /// An output without any value.
+    /// Rows of one time with different inputs.
     #[error(
-        "output {channel} has no value; give it at least one, or leave the channel out of record and twin"
+        "input {channel} is {}, and {} in the row before, which has the same time; rows of one time are readings of one state: give them the same inputs, or each its own time",
+        number(*value),
+        number(*before)
     )]
-    NoValue {
+    ReplicateInputs {
+        /// Sample, from 0.
+        sample: usize,
         /// Channel, from 1.
         channel: usize,
+        /// The value.
+        value: f64,
+        /// Value in the row before.
+        before: f64,
     },
+    /// An output that no record has a value of.
+    #[error(
+        "output {0} has no value in any record; add a record with that sensor, name its column, or leave the output out of the twin"
+    )]
+    NoValue(String),
     /// A missing output where every one is needed.
     #[error(
         "row {row}, column {column} is missing; features need every output: resample the record, or fit or diagnose it without an estimator"
@@ -69,6 +82,9 @@ pub enum RecordError {
         "column t: the steps vary, and a black-box twin is simulated with one step; resample the record"
     )]
     OneStep,
+    /// A start that belongs to a time after the first row, or to one too long before it.
+    #[error("{0}")]
+    Start(String),
     /// A step that a record cannot be resampled to.
     #[error("{0}")]
     Resample(String),

@@ -3,7 +3,7 @@
 use super::channels::{column_names, columns};
 use super::drive::{check_values, signal};
 use crate::math::six_digits;
-use crate::record::{Drive, RecordError, Signal, Signals, step_of};
+use crate::record::{Drive, Quantity, RecordError, Signal, Signals, step_of};
 use ndarray::{ArrayView2, s};
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
@@ -27,8 +27,8 @@ pub struct Record {
 }
 
 impl Record {
-    /// A record of inputs under `drive` and outputs (N × channels), NaN where one is missing. Each channel needs a value, and
-    /// two rows need one.
+    /// A record of inputs under `drive` and outputs (N × channels), NaN where one is missing. Two rows need a value. A channel may have none
+    /// where other records of the same system have it.
     pub fn new(drive: Drive, outputs: Signal) -> Result<Self, RecordError> {
         if outputs.nrows() != drive.samples() {
             return Err(RecordError::Lengths(format!(
@@ -43,10 +43,6 @@ impl Record {
         check_values(&outputs, "output", f64::is_infinite)?;
         if outputs.iter().any(|v| v.is_nan()) {
             let measured = |v: &f64| !v.is_nan();
-            let mut columns = outputs.columns().into_iter();
-            if let Some(j) = columns.position(|column| !column.iter().any(measured)) {
-                return Err(RecordError::NoValue { channel: j + 1 });
-            }
             let mut rows = outputs.rows().into_iter();
             let full = rows.by_ref().filter(|row| row.iter().any(measured)).take(2);
             let full = full.count();
@@ -131,6 +127,20 @@ impl Record {
         self.outputs.iter().filter(|v| v.is_nan()).count()
     }
 
+    /// Returns whether output j has a value.
+    pub(crate) fn has_output(&self, j: usize) -> bool {
+        self.outputs.column(j).iter().any(|v| !v.is_nan())
+    }
+
+    /// Checks that each of these outputs has a value in one of the records at least.
+    pub(crate) fn check_outputs(records: &[Self], outputs: &[Quantity]) -> Result<(), RecordError> {
+        let is_missing = |j: &usize| !records.iter().any(|record| record.has_output(*j));
+        match (0..outputs.len()).find(is_missing) {
+            None => Ok(()),
+            Some(j) => Err(RecordError::NoValue(outputs[j].name.clone())),
+        }
+    }
+
     /// Number of rows with an output that is not missing.
     pub(crate) fn measured_rows(&self) -> usize {
         let rows = self.outputs.rows().into_iter();
@@ -164,11 +174,14 @@ impl Record {
         })
     }
 
-    /// The first samples; `None` where an output has no value in them.
+    /// The first samples; `None` where an output of the record has no value in them.
     pub(crate) fn first_part(&self, samples: usize) -> Option<Self> {
         let drive = self.drive.first(samples);
         let outputs = self.outputs.slice(s![..samples, ..]).to_owned();
-        Self::new(drive, outputs).ok()
+        let part = Self::new(drive, outputs).ok()?;
+        let mut all = 0..self.outputs.ncols();
+        all.all(|j| part.has_output(j) == self.has_output(j))
+            .then_some(part)
     }
 
     /// The same cells of other outputs emptied, as many rows and channels.
@@ -270,8 +283,18 @@ mod tests {
         let expected = "row 5, column t: a step of 0.3 s where 0.1 s is usual;";
         assert!(refused.starts_with(expected), "{refused}");
         let message = |outputs| record(outputs).unwrap_err().to_string();
-        let no_value = message([1.0, nan, 2.0, nan, 3.0, nan]);
-        assert!(no_value.starts_with("output 2 has no value;"), "{no_value}");
+        let one = record([1.0, nan, 2.0, nan, 3.0, nan]).unwrap();
+        assert!(one.has_output(0) && !one.has_output(1));
+        let outputs = ["level", "flow"].map(|name| Quantity::new(name, ""));
+        let both = [one.clone(), some.clone()];
+        assert!(Record::check_outputs(&both, &outputs).is_ok());
+        let refused = Record::check_outputs(&both[..1], &outputs).unwrap_err();
+        let refused = refused.to_string();
+        assert!(
+            refused.starts_with("output flow has no value in any"),
+            "{refused}"
+        );
+        assert!(one.first_part(2).is_some() && some.first_part(2).is_none());
         let few = message([1.0, 2.0, nan, nan, nan, nan]);
         assert!(few.starts_with("1 rows with a measured output;"), "{few}");
     }

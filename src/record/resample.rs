@@ -81,6 +81,7 @@ pub fn resample(
             .map(|k| (drive.time(k), record.outputs()[[k, j]]))
             .filter(|(_, y)| !y.is_nan())
             .collect();
+        let measured = without_replicates(&measured);
         let mut next = 0;
         for (k, value) in column.iter_mut().enumerate() {
             let t = k as f64 * step;
@@ -101,12 +102,23 @@ pub fn resample(
             }
         }
     }
-    let drive = Drive::new(step, resampled_inputs(drive, step, samples, rule))?;
+    let inputs = resampled_inputs(drive, step, samples, rule);
+    let drive = Drive::new(step, inputs)?.beginning_at(drive.first_time());
     Ok(Resampled {
         record: Record::new(drive, all)?,
         interpolated,
         longest_gap,
     })
+}
+
+/// Values by time, the mean of those of one time in their place.
+fn without_replicates(measured: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    (measured.chunk_by(|a, b| a.0 == b.0))
+        .map(|group| {
+            let sum: f64 = group.iter().map(|(_, y)| y).sum();
+            (group[0].0, sum / group.len() as f64)
+        })
+        .collect()
 }
 
 fn resampled_inputs(drive: &Drive, step: f64, samples: usize, rule: InputRule) -> Signal {

@@ -33,8 +33,9 @@ impl Table {
                 format!("{names}: an input file has t and inputs alone; remove the output columns");
             return Err(RecordError::file(path, problem));
         }
+        let inputs = self.inputs.ncols();
         let drive = Drive::with_times(&self.times, self.inputs);
-        drive.map_err(|error| in_file(error, path, &self.time))
+        drive.map_err(|error| in_file(error, path, &self.time, inputs))
     }
 
     /// The table as a record, which needs outputs.
@@ -43,9 +44,10 @@ impl Table {
             let problem = "no output column; a record needs y, or y1,y2,…";
             return Err(RecordError::file(path, problem));
         }
+        let inputs = self.inputs.ncols();
         (Drive::with_times(&self.times, self.inputs))
             .and_then(|drive| Record::new(drive, self.outputs))
-            .map_err(|error| in_file(error, path, &self.time))
+            .map_err(|error| in_file(error, path, &self.time, inputs))
     }
 
     /// Parses a table; `read` counts the numbers of this file and those before.
@@ -78,7 +80,8 @@ impl Table {
         let (usual, inputs, outputs) = usual
             .and_then(|usual| {
                 let names: Vec<&str> = usual.iter().flatten().map(String::as_str).collect();
-                let (inputs, outputs) = channels(&names)?;
+                let twin = signals.map_or(0, |signals| signals.outputs.len());
+                let (inputs, outputs) = channels(&names, twin)?;
                 Ok((usual, inputs, outputs))
             })
             .map_err(|problem| RecordError::Columns {
@@ -93,7 +96,8 @@ impl Table {
         let time = (places.iter().position(|place| *place == Some(0))).map_or("t", |j| header[j]);
         // Numbers alone are kept, and each once: a record may fill half of the memory.
         let (mut t, mut u, mut y) = (Vec::new(), Vec::new(), Vec::new());
-        let mut row = vec![0.0; width];
+        // An output without a column is missing.
+        let mut row = vec![f64::NAN; width];
         let mut cells = csv::StringRecord::new();
         let mut parser = CellParser::new(separator, inputs);
         while reader.read(&mut cells).map_err(csv_error)? {
@@ -136,10 +140,16 @@ impl Table {
 }
 
 /// Adds file, row and column to an error of the numbers of a table.
-fn in_file(error: RecordError, path: &Path, time: &str) -> RecordError {
+fn in_file(error: RecordError, path: &Path, time: &str, inputs: usize) -> RecordError {
     match error {
         RecordError::TimeOrder { sample, .. } => {
             RecordError::cell(path, sample + 2, time, error.to_string())
+        }
+        RecordError::ReplicateInputs {
+            sample, channel, ..
+        } => {
+            let column = column_names("u", inputs).swap_remove(channel - 1);
+            RecordError::cell(path, sample + 2, &column, error.to_string())
         }
         RecordError::Step(step) => RecordError::file(
             path,
@@ -285,10 +295,16 @@ fn check_header(names: &[&str]) -> Result<(), &'static str> {
     }
 }
 
-/// Number of inputs and outputs that a header names: each of t, u…, y… once and without gaps.
-fn channels(names: &[&str]) -> Result<(usize, usize), String> {
+/// Number of inputs and outputs of a header: each of t, u…, y… once and without gaps. Of a twin with so many outputs, some may be left out.
+fn channels(names: &[&str], twin: usize) -> Result<(usize, usize), String> {
     let count = |letter: char| names.iter().filter(|n| n.starts_with(letter)).count();
-    let (inputs, outputs) = (count('u'), count('y'));
+    let number = |name: &&str| name.strip_prefix('y')?.parse::<usize>().ok();
+    let is_of_twin = |name: &&str| number(name).is_some_and(|n| (1..=twin).contains(&n));
+    let (inputs, mut outputs) = (count('u'), count('y'));
+    let mut all = names.iter().filter(|name| name.starts_with('y'));
+    if (1..twin).contains(&outputs) && all.all(is_of_twin) {
+        outputs = twin;
+    }
     let expected = columns(inputs, outputs);
     let rename = format!("rename the columns to {}", excerpt(&expected.join(",")));
     if names.iter().filter(|name| **name == "t").count() > 1 {

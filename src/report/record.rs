@@ -27,6 +27,9 @@ impl RecordPicture<'_> {
         let outputs = || self.outputs.iter().enumerate();
         let errors: Vec<String> = outputs()
             .map(|(j, output)| {
+                if !self.has(j) {
+                    return format!("{}: not measured", output.name);
+                }
                 let of = |run: &Run<'_>| format!("{} {}", run.0, self.rmse(run, j, output));
                 let all: Vec<String> = self.runs.iter().map(of).collect();
                 format!("{}: {}", output.name, all.join(", "))
@@ -45,11 +48,23 @@ impl RecordPicture<'_> {
     fn panels(&self, j: usize, output: &Quantity) -> Vec<Panel> {
         let timed = |values: &Signal| self.times.iter().copied().zip(values.column(j).to_vec());
         let shown = roomy(self.measured.column(j).iter().copied());
-        let mut over = vec![Line::new("measured", Style::RECORD, timed(self.measured))];
+        let word = if self.has(j) {
+            "measured"
+        } else {
+            "not measured"
+        };
+        let mut over = vec![Line::new(word, Style::RECORD, timed(self.measured))];
         let mut left = vec![];
         for run in &self.runs {
-            let label = format!("{}, {}", run.0, self.rmse(run, j, output));
-            over.push(Line::new(&label, run.1, timed(run.2)).within(shown.clone()));
+            let label = match self.has(j) {
+                true => format!("{}, {}", run.0, self.rmse(run, j, output)),
+                false => run.0.to_owned(),
+            };
+            let line = Line::new(&label, run.1, timed(run.2));
+            over.push(match self.has(j) {
+                true => line.within(shown.clone()),
+                false => line,
+            });
             let residual = self.times.iter().copied().zip(self.residual(run, j));
             left.push(Line::new("", run.1, residual));
         }
@@ -57,10 +72,15 @@ impl RecordPicture<'_> {
             .spans((self.spans)(&output.name))
             .marks(self.marks.clone());
         let label = format!("{}: record − twin{}", output.name, in_unit(&output.unit));
-        match left.is_empty() {
+        match left.is_empty() || !self.has(j) {
             true => vec![above],
             false => vec![above, Panel::new(&label, left).height(90.0)],
         }
+    }
+
+    /// Returns whether the record has values of an output.
+    fn has(&self, j: usize) -> bool {
+        self.measured.column(j).iter().any(|v| v.is_finite())
     }
 
     fn residual(&self, run: &Run<'_>, j: usize) -> Vec<f64> {
@@ -180,6 +200,12 @@ mod tests {
         ] {
             assert!(svg.contains(expected), "{expected}");
         }
+        let mut absent = record.outputs().clone();
+        absent.column_mut(1).fill(f64::NAN);
+        let absent = Record::new(record.drive().clone(), absent).unwrap();
+        let svg = overlay_svg(&study, &absent, None, Some(&run));
+        assert!(svg.contains("not measured") && svg.contains("twin, RMSE 0.00 m"));
+        assert!(!svg.contains("flow: record − twin") && !svg.contains("NaN"));
         let both = overlay_svg(&study, &record, Some(&run), Some(&run));
         assert!(both.contains("before, RMSE") && both.contains("after, RMSE"));
     }

@@ -239,6 +239,7 @@ mod tests {
             [start]
             h1 = "estimate"
             h2 = 5.2
+            h3 = { value = 5.2, at = -1.0 }
             [features]
             kind = "arx"
             outputs = 4
@@ -253,17 +254,19 @@ mod tests {
         );
         assert!(file.prior.trust);
         assert_eq!(file.noise["y"], NoiseLevel::Estimate);
-        assert_eq!(
-            file.start["h2"],
-            StartLevel::Declared {
-                mean: 5.2,
-                std: 0.0
-            }
-        );
+        assert_eq!(file.start["h2"], StartLevel::known(5.2));
         let written = toml::to_string(&file).unwrap();
         let again = parse(&written).unwrap();
         assert_eq!(written, toml::to_string(&again).unwrap());
-        for part in ["trust", "start.h1", "inf", "sensor-lag", "arx", "time (s)"] {
+        for part in [
+            "trust",
+            "start.h1",
+            "inf",
+            "sensor-lag",
+            "arx",
+            "time (s)",
+            "at = -1.0",
+        ] {
             assert!(written.contains(part), "{written}");
         }
     }

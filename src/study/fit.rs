@@ -57,8 +57,9 @@ impl Study {
             "choose a level between 0 and 1, such as 0.9",
         )?;
         for record in records {
-            record.check_channels(&self.twin.signals())?;
+            self.check_channels(record)?;
         }
+        Record::check_outputs(records, &self.twin.signals().outputs)?;
         let clock = Instant::now();
         let study = self.for_records(records)?;
         let effects = study.added_effects()?;
@@ -77,7 +78,7 @@ impl Study {
     ///
     /// [`StudyError`]: a record that does not fit the twin, a twin that cannot be filtered there.
     pub fn score(&self, fit: &Fit, record: &Record) -> Result<FitScore, StudyError> {
-        record.check_channels(&self.twin.signals())?;
+        self.check_channels(record)?;
         let study = self.for_records(std::slice::from_ref(record))?;
         let subject = Subject {
             twin: &study.twin,
@@ -111,6 +112,14 @@ impl Study {
                 .map(|(name, ..)| name)
                 .collect(),
             factors: declared.map(|(name, _, factor)| (name, factor)).collect(),
+            estimated: (self.file.start.iter())
+                .filter(|(_, level)| matches!(level, StartLevel::Estimate))
+                .map(|(name, _)| name.clone())
+                .collect(),
+            wide: (starts.clone())
+                .filter(|(_, level)| !matches!(level, StartLevel::Declared { std: 0.0, .. }))
+                .map(|(name, _)| name.clone())
+                .collect(),
             starts: starts.map(|(name, _)| name.clone()).collect(),
         }
     }

@@ -18,7 +18,7 @@ pub use plan::RecordPlan;
 pub(crate) use tables::{Library, RecordTable};
 
 use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment};
-use crate::record::{Drive, Record};
+use crate::record::{Drive, Record, RecordError};
 use crate::setting::did_you_mean;
 use crate::twin::{
     Adaptation, DigitalTwin, Integrator, MOST_SUBSTEPS, Noise, NoiseLevel, Role, Stepping, Twin,
@@ -207,6 +207,7 @@ impl Study {
                 step,
                 samples,
                 input,
+                first_time: own.map_or(0.0, |plan| plan.first_time),
             })),
             _ if record.is_plan() => Err(StudyError::NoPlan),
             _ => Ok(None),
@@ -372,8 +373,14 @@ impl Study {
 
     /// Checks that a record has the channels of this study, and that no output is missing.
     pub(crate) fn check_complete(&self, record: &Record) -> Result<(), StudyError> {
-        record.check_channels(&self.twin.signals())?;
+        self.check_channels(record)?;
         Ok(record.check_complete()?)
+    }
+
+    /// Checks that a record has the channels of this study, and begins no earlier than the start of the twin.
+    pub(crate) fn check_channels(&self, record: &Record) -> Result<(), RecordError> {
+        record.check_channels(&self.twin.signals())?;
+        self.twin.check_start(record.drive())
     }
 }
 

@@ -52,15 +52,18 @@ pub struct RecordPlan {
     pub samples: usize,
     /// Inputs; `None` for a twin without.
     pub(crate) input: Option<InputPlan>,
+    /// Time of the first row, in seconds.
+    pub(crate) first_time: f64,
 }
 
 impl RecordPlan {
-    /// A record without inputs.
+    /// A record without inputs, its first row at 0 s.
     pub fn autonomous(step: f64, samples: usize) -> Self {
         Self {
             step,
             samples,
             input: None,
+            first_time: 0.0,
         }
     }
 
@@ -71,19 +74,26 @@ impl RecordPlan {
             step,
             samples,
             input: Some(InputPlan::Levels(Levels { levels, hold })),
+            first_time: 0.0,
         }
     }
 
-    /// A record like a measured one: its step and length, levels in the range of its inputs.
+    /// A record like a measured one: its times, levels in the range of its inputs.
     pub(super) fn like(record: &Record) -> Self {
         let drive = record.drive();
         let (step, samples) = (drive.dt(), record.samples());
         let inputs: Vec<f64> = drive.inputs().iter().copied().collect();
-        if inputs.is_empty() {
-            return Self::autonomous(step, samples);
+        let plan = match inputs.is_empty() {
+            true => Self::autonomous(step, samples),
+            false => {
+                let (low, high) = ends(&inputs);
+                Self::levels(step, samples, low, high, (samples / HOLDS).max(1))
+            }
+        };
+        Self {
+            first_time: drive.first_time(),
+            ..plan
         }
-        let (low, high) = ends(&inputs);
-        Self::levels(step, samples, low, high, (samples / HOLDS).max(1))
     }
 
     /// Checks step, length and levels; a file of inputs is not read.
@@ -124,7 +134,10 @@ impl RecordPlan {
         self.check(signals)?;
         let channels = signals.inputs.len();
         let fixed = match &self.input {
-            None if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
+            None if channels == 0 => {
+                let drive = Drive::autonomous(self.step, self.samples)?;
+                Some(drive.beginning_at(self.first_time))
+            }
             None => return Err(StudyError::NoInput(channels)),
             Some(InputPlan::File(path)) => Some(read(path, channels)?),
             Some(InputPlan::Levels(_)) => None,
@@ -189,7 +202,7 @@ impl DriveSource {
                 }
             }
         }
-        Drive::new(self.plan.step, inputs)
+        Ok(Drive::new(self.plan.step, inputs)?.beginning_at(self.plan.first_time))
     }
 }
 

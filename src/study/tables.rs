@@ -175,7 +175,7 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
                 "is no list; give a standard deviation, or { std = .., known = true }"
             }
             DeValue::Array(_) if name == "start" => {
-                "is no list; give a value, \"estimate\", or { mean = .., std = .. }"
+                "is no list; give a value, { value = .., at = .. }, { mean = .., std = .. }, or \"estimate\""
             }
             _ => continue,
         };

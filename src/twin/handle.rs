@@ -1,6 +1,6 @@
 //! The handle by which every stage holds a twin.
 
-use super::composed::{FREE_RUNS, Parts};
+use super::composed::{FREE_RUNS, Parts, check_start};
 use super::definitions::defined_states;
 use crate::record::{Drive, RecordError, Signal, Signals};
 use crate::twin::{
@@ -79,11 +79,20 @@ impl Twin {
         }
     }
 
-    /// Checks that the twin can be simulated on the time grid of a drive: a black box needs one step.
+    /// Checks that the twin can be simulated on the time grid of a drive: equations start no later than at its first row, a black box needs one
+    /// step.
     pub(crate) fn check_drive(&self, drive: &Drive) -> Result<(), RecordError> {
         match self {
-            Self::Equations(_) => Ok(()),
+            Self::Equations(_) => self.check_start(drive),
             Self::BlackBox(_) => drive.check_uniform(),
+        }
+    }
+
+    /// Checks that equations start no later than at the first row of a drive.
+    pub(crate) fn check_start(&self, drive: &Drive) -> Result<(), RecordError> {
+        match self {
+            Self::Equations(twin) => check_start(twin, drive).map_err(RecordError::Start),
+            Self::BlackBox(_) => Ok(()),
         }
     }
 

@@ -7,7 +7,7 @@ use std::cmp::Ordering;
 /// Time, step, inputs and parameters at which equations are evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct Now<'a> {
-    /// Time in seconds from the first sample.
+    /// Time in seconds on the record's own clock: `t` of its rows.
     pub t: f64,
     /// Step Δt in seconds: to the next sample, or a substep where [`StateSpace::drift`](crate::twin::StateSpace::drift) is evaluated.
     pub dt: f64,
@@ -17,10 +17,14 @@ pub struct Now<'a> {
     pub theta: &'a [f64],
     /// Position between samples; `None` where inputs are held from one to the next.
     pub(crate) between: Option<Between<'a>>,
+    /// Time of the first row: laws of effects count from there.
+    pub(crate) first_time: f64,
+    /// Time that the start belongs to, the first row's or one before it: delays count from there.
+    pub(crate) begun: f64,
 }
 
 impl<'a> Now<'a> {
-    /// Time `t`, step `dt`, inputs `u` held over the step, and parameters θ.
+    /// Time `t`, step `dt`, inputs `u` held over the step, and parameters θ; the first row is at 0.
     pub fn new(t: f64, dt: f64, u: &'a [f64], theta: &'a [f64]) -> Self {
         Self {
             t,
@@ -28,6 +32,8 @@ impl<'a> Now<'a> {
             u,
             theta,
             between: None,
+            first_time: 0.0,
+            begun: 0.0,
         }
     }
 }

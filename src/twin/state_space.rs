@@ -58,13 +58,13 @@ pub trait StateSpace: Send + Sync {
     /// `y` = g: outputs of `x` without noise.
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]);
 
-    /// State at the first sample; zero by default.
-    fn start(&self, _now: &Now<'_>, x: &mut [f64]) {
-        x.fill(0.0);
-    }
+    /// State at the first row; the slice comes zeroed. A state that is set here has a known start, unless
+    /// [`start_deviation`](Self::start_deviation) or the study says otherwise, or the first row of a record shows another one. A state that is left
+    /// alone, as all are by default, has an unknown start: simulations begin at zero, fits and diagnoses find it.
+    fn start(&self, _now: &Now<'_>, _x: &mut [f64]) {}
 
-    /// Standard deviations of the state at the first sample, around [`start`](Self::start): a filter integrates over it, a noisy
-    /// run draws from it. Zero, a known start, by default; the slice comes zeroed.
+    /// Standard deviations of the state at the first row, around [`start`](Self::start): a filter integrates over it, a noisy
+    /// run draws from it. Zero by default; the slice comes zeroed.
     fn start_deviation(&self, _now: &Now<'_>, _std: &mut [f64]) {}
 
     /// Noise levels at the states `x`: standard deviation of the increment added to each state a step, and of each output.

@@ -278,11 +278,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 152, items.collect()),
         Ratchet::new("error types", 13, errors),
-        Ratchet::new("lines of code", 48_690, lines),
-        Ratchet::new("files", 413, files.collect()),
+        Ratchet::new("lines of code", 49_500, lines),
+        Ratchet::new("files", 414, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 406, constants(sources)),
+        Ratchet::new("named numeric constants", 410, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             4,

@@ -18,6 +18,7 @@ mod fit;
 mod golden;
 mod misspecification;
 mod numbers;
+mod records;
 mod suitability;
 
 /// Counts that `trials` of this probability give with at least `level`; each tail outside has at most (1 − level)/2.

@@ -36,7 +36,7 @@ class Diverged(Exception):
     Parameters
     ----------
     time : float
-        Time of the divergence in seconds, between 0 and the end of the record.
+        Time of the divergence in seconds, between the first time and the end of the record.
     """
 
     def __init__(self, time: float = 0.0) -> None:

@@ -71,7 +71,7 @@ class Model:
         self._takes_step = _takes(simulator, "step")
         self.takes_seed = _takes(simulator, "seed")
         self._kept: dict[bytes, dict[str, Array]] = {}
-        self._times: dict[tuple[float, int], Array] = {}
+        self._times: dict[tuple[float, int, float], Array] = {}
         record: dict[str, Any] = {"step": self.step, "samples": int(samples)}
         if levels is not None:
             record["input"] = {"levels": [float(level) for level in levels], "hold": int(hold)}
@@ -91,16 +91,17 @@ class Model:
             return json.dumps(self.description).encode() + b"\n"
         try:
             step, samples = request["step"], request["samples"]
+            start = request.get("start", 0.0)
             keywords: dict[str, Any] = {}
             if self._takes_step:
                 keywords["step"] = step
             if self.takes_seed:
                 keywords["seed"] = json.loads(seed)
-            result = self.simulator(request["theta"], self._inputs(inputs), self._time(step, samples), **keywords)
+            result = self.simulator(request["theta"], self._inputs(inputs), self._time(step, samples, start), **keywords)
             outputs = ",".join(f"{json.dumps(key)}:[{_numbers(column)}]" for key, column in self._columns(result, samples))
             answer = f'"outputs":{{{outputs}}}'
         except Diverged as error:
-            answer = f'"diverged":{error.time!r}'
+            answer = f'"diverged":{max(error.time - start, 0.0)!r}'
         except (OverflowError, FloatingPointError):
             # Arithmetic beyond the finite numbers, which arrays show as inf: at these parameters, not in the code.
             answer = '"diverged":0'
@@ -110,10 +111,10 @@ class Model:
             answer = f'"error":{json.dumps(_located(error, self.simulator))}'
         return f'{{"id":{request["id"]},{answer}}}\n'.encode()
 
-    def _time(self, step: float, samples: int) -> Array:
-        key = (step, samples)
+    def _time(self, step: float, samples: int, start: float) -> Array:
+        key = (step, samples, start)
         if key not in self._times:
-            self._times = {key: _frozen(np.arange(samples, dtype=float) * step)}
+            self._times = {key: _frozen(start + np.arange(samples, dtype=float) * step)}
         return self._times[key]
 
     def _inputs(self, text: bytes) -> dict[str, Array]:

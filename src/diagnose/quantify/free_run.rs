@@ -3,7 +3,7 @@
 use crate::diagnose::outcome::FreeRuns;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::problem::Problem;
-use crate::likelihood::kalman::recoverable;
+use crate::likelihood::kalman::{FilterError, States, recoverable};
 use crate::math::median;
 use crate::record::{Record, Signal};
 use crate::study::StudyError;
@@ -22,17 +22,15 @@ impl Runner {
     pub fn new(problem: &Problem, theta: &[f64]) -> Result<Option<Self>, StudyError> {
         let twin = match recoverable(problem.smoothed(theta))? {
             None => return Ok(None),
-            Some(smoothed) => match smoothed.first() {
-                Some(first) => begun(
-                    &problem.twin,
-                    &first.first(),
-                    problem.records[0].drive().dt(),
-                ),
-                None => Some(problem.twin.clone()),
+            Some(smoothed) => match smoothed.first().map(States::first) {
+                Some(first) if first.iter().any(|x| !x.is_finite()) => return Ok(None),
+                Some(first) => begun(&problem.twin, &first, problem.records[0].drive().dt())
+                    .map_err(FilterError::from)?,
+                None => problem.twin.clone(),
             },
         };
         let theta = problem.of_record(0, theta);
-        Ok(twin.map(|twin| Self { twin, theta }))
+        Ok(Some(Self { twin, theta }))
     }
 
     /// Squared errors of the free run over the variance of y, mean over channels, by sample from `from` on. Missing outputs, and

@@ -115,7 +115,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
     let given = drive.inputs();
     let inputs = given.ncols();
     if inputs == 0 {
-        let drive = Drive::autonomous(dt, samples)?;
+        let drive = Drive::autonomous(dt, samples)?.beginning_at(drive.first_time());
         return Ok(match times {
             1 => vec![],
             _ => vec![Proposal {
@@ -168,7 +168,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
                 let (low, high) = ranges[j];
                 low + shares[[k, j]].clamp(0.0, 1.0) * (high - low)
             });
-            let drive = Drive::new(dt, values)?;
+            let drive = Drive::new(dt, values)?.beginning_at(drive.first_time());
             let kind = format!("{kind}{long}");
             Ok(Proposal { kind, drive })
         })

@@ -230,12 +230,11 @@ impl ModelDescription {
         let same = first.filter(|_| limits.all(|other| other == first));
         let levels = same.and_then(|(low, high)| Interval::new(low, high).ok());
         RecordPlan {
-            step,
-            samples,
             input: levels.map(|levels| {
                 let hold = (samples / HOLDS).max(1);
                 InputPlan::Levels(Levels { levels, hold })
             }),
+            ..RecordPlan::autonomous(step, samples)
         }
     }
 }

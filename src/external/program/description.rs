@@ -145,9 +145,8 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
         );
     }
     Ok(RecordPlan {
-        step,
-        samples,
         input: table.input.clone(),
+        ..RecordPlan::autonomous(step, samples)
     })
 }
 

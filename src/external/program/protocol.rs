@@ -33,6 +33,9 @@ struct SimulateRequest<'a> {
     theta: Named<'a, f64>,
     step: f64,
     samples: usize,
+    /// Time of the first sample, where it is not 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    start: Option<f64>,
     inputs: Named<'a, Vec<f64>>,
     seed: Option<u64>,
 }
@@ -54,6 +57,7 @@ pub(super) fn simulate(
         theta: Named(names.into_iter().zip(theta.iter().copied()).collect()),
         step: drive.dt(),
         samples: drive.samples(),
+        start: Some(drive.first_time()).filter(|start| *start != 0.0),
         inputs: Named(
             (inputs.iter())
                 .map(|q| q.name.as_str())
@@ -232,6 +236,13 @@ mod tests {
         let back: serde_json::Value = serde_json::from_str(&line).unwrap();
         assert_eq!(back["theta"]["b"].as_f64(), Some(1.0 / 7.0));
         assert_eq!(back["step"].as_f64(), Some(1.0 / 3.0));
+        assert!(back.get("start").is_none());
+        let late = drive.clone().beginning_at(100.5);
+        let late = simulate(3, &description, &[1.0 / 7.0, 2.0], &late, None);
+        assert!(
+            late.contains("\"samples\":4,\"start\":100.5,\"inputs\""),
+            "{late}"
+        );
         for (k, value) in values.iter().enumerate() {
             assert_eq!(back["inputs"]["u"][k].as_f64(), Some(*value));
         }

@@ -39,7 +39,11 @@ impl Term {
             .map(|m| held.get(m.name).or_else(|| free.next()).copied())
             .collect::<Option<_>>()?;
         let all: Vec<Vec<Record>> = (records.iter())
-            .map(|record| unfolded(effect, &m, record, output))
+            .map(|record| match record.has_output(output) {
+                true => unfolded(effect, &m, record, output),
+                // A record without the sensor has no fold.
+                false => vec![record.clone(); SIDES],
+            })
             .collect();
         let sides = all.iter().map(Vec::len).min().filter(|sides| *sides > 0)?;
         let of_side = |side: usize| all.iter().map(|record| record[side].clone()).collect();

@@ -35,7 +35,7 @@ pub(crate) fn measured(
         _ => false,
     };
     let (parameters, outputs): (Vec<Parameter>, Vec<usize>) =
-        levels(base, record, if is_silent { LEAST } else { NONE })
+        levels(base, records, if is_silent { LEAST } else { NONE })
             .into_iter()
             .unzip();
     let twin = Twin::BlackBox(base.clone());
@@ -65,12 +65,14 @@ fn size(values: &[f64]) -> f64 {
 }
 
 /// Levels that are fitted, each with the index of its output.
-fn levels(twin: &ComposedBlackBox, record: &Record, least: f64) -> Vec<(Parameter, usize)> {
+fn levels(twin: &ComposedBlackBox, records: &[Record], least: f64) -> Vec<(Parameter, usize)> {
     let space = twin.parameters();
     (twin.signals().outputs.iter().enumerate())
         .filter(|(_, output)| space.position(&Role::Noise.name(&output.name)).is_err())
         .map(|(j, output)| {
-            let size = size(&record.outputs().column(j).to_vec());
+            // Of the first record that has it.
+            let having = records.iter().find(|record| record.has_output(j));
+            let size = having.map_or(1.0, |record| size(&record.outputs().column(j).to_vec()));
             let parameter = Parameter {
                 name: Role::Noise.name(&output.name),
                 unit: output.unit.clone(),

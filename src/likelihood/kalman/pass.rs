@@ -195,7 +195,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         for i in 0..self.order.rows() {
             self.measure(i, &mut state, &mut root, sink)?;
             if i >= self.order.before && i + 1 < self.order.rows() {
-                self.carry(i - self.order.before, &mut state, &mut root, sink);
+                self.go_on(i - self.order.before, &mut state, &mut root, sink);
             }
         }
         let total = self.update.likelihood.total();
@@ -216,14 +216,14 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 let mut state = FilterState::zero(n);
                 state.set(belief);
                 self.go_to(k, &state);
-                self.carry(k, &mut state, &mut root, sink);
+                self.go_on(k, &mut state, &mut root, sink);
                 (k + 1, state)
             }
             None => (0, self.start()),
         };
         for k in first..to {
             self.measure(k, &mut state, &mut root, sink)?;
-            self.carry(k, &mut state, &mut root, sink);
+            self.go_on(k, &mut state, &mut root, sink);
         }
         Ok(())
     }
@@ -247,11 +247,36 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             let i = held_by(lane, self.jobs.len());
             mean.fill(0.0);
             cov.fill(0.0);
-            (self.jobs[i].kalman).start(&self.now[i], &mut mean, &mut cov, &mut scale);
+            let now = self.jobs[i].acting.start();
+            (self.jobs[i].kalman).start(&now, &mut mean, &mut cov, &mut scale);
             let to = means.iter_mut().chain(&mut *covs);
             for (to, value) in to.zip(mean.iter().chain(&cov)) {
                 *to.lane_mut(lane) = *value;
             }
+        }
+        // Filters side by side have as many steps before their first rows.
+        let steps = self.jobs[0].acting.steps_before();
+        if steps > 0 {
+            let mut state = FilterState::zero(n);
+            state.set(self.copy.belief(n));
+            self.run_to_first_row(steps, &mut state);
+            self.copy.set(state.belief(n));
+        }
+    }
+
+    /// Carries the start to the first row.
+    #[cold]
+    fn run_to_first_row(&mut self, steps: usize, state: &mut FilterState<S, N>) {
+        let mut root = Root::new(self.size.states());
+        for i in 0..steps {
+            for (now, job) in self.now.iter_mut().zip(self.jobs) {
+                *now = job.acting.before(i);
+            }
+            self.set_noise(state);
+            self.carry(0, state, &mut root, &mut ());
+        }
+        for (now, job) in self.now.iter_mut().zip(self.jobs) {
+            *now = job.acting.at(0);
         }
     }
 
@@ -261,6 +286,12 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         for (now, job) in self.now.iter_mut().zip(self.jobs) {
             job.acting.go_to(k, now);
         }
+        self.set_noise(state);
+    }
+
+    /// Noise levels of the present step at the mean of the state.
+    #[inline(always)]
+    fn set_noise(&mut self, state: &FilterState<S, N>) {
         let (n, p) = (self.size.states(), self.size.outputs());
         let (q, r) = (
             &mut self.q.numbers_mut()[..n],
@@ -348,6 +379,24 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             return (self.update).apply_present(&row, root, outputs, (mean, cov));
         }
         (self.update).apply(&row, root, outputs, (mean, cov))
+    }
+
+    /// Carries the state from row k to the next, unless that is another reading of it. Filters side by side have the same replicates.
+    #[inline(always)]
+    fn go_on<K: Sink<N> + ?Sized>(
+        &mut self,
+        k: usize,
+        state: &mut FilterState<S, N>,
+        root: &mut Root<S::Matrix<N>>,
+        sink: &mut K,
+    ) {
+        if !self.jobs[0].acting.stands(k) {
+            return self.carry(k, state, root, sink);
+        }
+        if sink.wants_carried() {
+            let belief = state.belief(self.size.states());
+            sink.carried(k, belief, belief.cov);
+        }
     }
 
     /// Carries the state from row k to the next.

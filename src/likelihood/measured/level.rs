@@ -1,7 +1,7 @@
 //! Fitted noise levels: what is declared, or guessed from the records.
 
 use crate::effect::stops;
-use crate::record::Record;
+use crate::record::{Quantity, Record};
 use crate::twin::{
     Composed, FittedLevels, Interval, LevelSource, Outline, Parameter, Role, Twin, TwinPart,
     is_memory,
@@ -36,6 +36,37 @@ pub(crate) struct Beliefs {
     pub factors: BTreeMap<String, f64>,
     /// States whose start is declared.
     pub starts: BTreeSet<String>,
+    /// Those of them that are not quite known.
+    pub wide: BTreeSet<String>,
+    /// States whose start is to be estimated, whatever the code says.
+    pub estimated: BTreeSet<String>,
+}
+
+/// An output whose first value is not that of the start.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StartElsewhere {
+    /// Index of the record.
+    pub record: usize,
+    /// The output.
+    pub output: Quantity,
+    /// Its first value.
+    pub value: f64,
+    /// The value nearest to it that the start allows.
+    pub expected: f64,
+    /// States whose start is then unknown.
+    pub states: Vec<String>,
+}
+
+/// Sizes of what a record shows, from which levels are guessed.
+pub(super) struct RecordSizes {
+    /// Motion of each state.
+    pub states: Vec<f64>,
+    /// Deviation of each output.
+    pub outputs: Vec<f64>,
+    /// Standard deviation of each start that is unknown.
+    pub starts: Vec<Option<f64>>,
+    /// Noise that is declared.
+    pub declared: DeclaredLevels,
 }
 
 /// A fitted noise level.
@@ -61,6 +92,16 @@ pub(crate) struct Measured {
     pub levels: Vec<Level>,
     /// `true` for a black box without noise of its own: its run is its prediction.
     pub is_silent: bool,
+    /// A start that was said, and is not that of these records.
+    pub elsewhere: Option<StartElsewhere>,
+}
+
+impl Measured {
+    /// All of θ with loud noise, from the twin's own.
+    pub(super) fn begun_loud(&self, theta: &[f64]) -> Vec<f64> {
+        let levels = self.levels.iter().map(|level| level.loud);
+        theta.iter().copied().chain(levels).collect()
+    }
 }
 
 /// Noise levels that a twin declares, of states for an increment in a step of the study, and of outputs.
@@ -70,25 +111,19 @@ pub(super) struct DeclaredLevels {
     pub measurement: Vec<f64>,
 }
 
-/// Sizes of states and outputs, and the noise that is declared of them.
-pub(super) struct Sizes {
-    pub states: Vec<f64>,
-    pub outputs: Vec<f64>,
-    pub declared: DeclaredLevels,
-}
-
 /// The twin with these sizes of states and outputs.
 pub(super) fn build(
     base: &Composed,
     outline: &Outline,
     records: &[Record],
     beliefs: &Beliefs,
-    sizes: &Sizes,
+    sizes: &RecordSizes,
 ) -> Measured {
-    let Sizes {
-        states: sizes,
+    let RecordSizes {
+        states: motion,
         outputs,
         declared,
+        starts: widths,
     } = sizes;
     let (n, p) = (outline.states.len(), outline.outputs.len());
     let mut noisy = FittedLevels {
@@ -141,14 +176,13 @@ pub(super) fn build(
             format!("{}/√s", state.unit)
         };
         let declared = declared.process[i] / beliefs.step.sqrt();
-        let guess = WANDER * sizes[i] / longest.sqrt();
-        let loud = LOUD * sizes[i] / step.sqrt();
+        let guess = WANDER * motion[i] / longest.sqrt();
+        let loud = LOUD * motion[i] / step.sqrt();
         if let Some(entry) = add(&state.name, unit, 0.0, declared, guess, loud) {
             noisy.process[i] = LevelSource::Fitted { entry, declared };
         }
-        if !beliefs.starts.contains(&state.name) {
-            let (state, std) = (i, sizes[i]);
-            starts.push(TwinPart::UncertainStart { state, std });
+        if let Some(std) = widths[i] {
+            starts.push(TwinPart::UncertainStart { state: i, std });
         }
     }
     for (j, output) in outline.outputs.iter().enumerate() {
@@ -173,5 +207,6 @@ pub(super) fn build(
         twin: twin.with(parameters, starts),
         levels,
         is_silent: false,
+        elsewhere: None,
     }
 }

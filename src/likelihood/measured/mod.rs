@@ -7,22 +7,25 @@
 //! state i   increment in Δt:  N(0, σ_i²·Δt)       σ_i in units of the state per √s
 //! output j  error of a row:   N(0, r_j²)
 //! ln σ ~ N(ln σ_0, s²)                             σ_0 declared: s = ln factor;  nothing declared: from the record, s = 2
-//! x(0) ~ N(start, d²)                              d declared, or the size of the state's own motion
+//! x(0) ~ N(start, d²)                              d declared; 0 where the twin or the study says the start; else, in quadrature, the size of
+//!                                                  the state's own motion and the distance of its first row from the twin's start
 //! ```
 
 mod level;
 mod motion;
+mod start;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use level::{Beliefs, Level, Measured};
+pub(crate) use level::{Beliefs, Level, Measured, StartElsewhere};
 
 use super::ensemble;
 use super::kalman::FilterError;
 use crate::record::Record;
 use crate::twin::{Composed, ParameterSpace, Role, Twin, TwinError, TwinPart, fix};
-use level::{Sizes, build};
+use level::{RecordSizes, build};
 use motion::{declared_levels, followed_motion, free_motion, size};
+use start::{Starts, distances};
 use std::collections::BTreeMap;
 
 /// The twin as these records show it. A black box has noise of its own, or is given that of a sensor.
@@ -39,9 +42,21 @@ pub(crate) fn measured(
                 twin,
                 levels: vec![],
                 is_silent,
+                elsewhere: None,
             })
         }
     }
+}
+
+/// A start that the twin or the study says, and that is not that of these records.
+pub(crate) fn start_elsewhere(
+    twin: &Twin,
+    records: &[Record],
+    beliefs: &Beliefs,
+) -> Option<StartElsewhere> {
+    let twin = twin.equations()?;
+    let theta = without_effects(&twin.outline().parameters);
+    Starts::of(twin, records, beliefs, &theta).elsewhere
 }
 
 /// The twin with these noise levels in place of its own; all else stays, its start too. Levels by state, per √s, or by output; each run draws
@@ -56,19 +71,17 @@ pub(crate) fn with_levels(
         return Ok(twin.clone());
     };
     let outline = base.outline();
-    let beliefs = Beliefs {
-        starts: outline.states.iter().map(|s| s.name.clone()).collect(),
-        ..beliefs.clone()
-    };
     let records = std::slice::from_ref(record);
     let theta = without_effects(&outline.parameters);
-    // Sizes make guesses alone, and none is used.
-    let sizes = Sizes {
-        states: vec![1.0; outline.states.len()],
+    // Sizes make guesses alone, and none is used; starts stay as they are.
+    let states = outline.states.len();
+    let sizes = RecordSizes {
+        states: vec![1.0; states],
         outputs: vec![1.0; outline.outputs.len()],
+        starts: vec![None; states],
         declared: declared_levels(base, records, &theta, beliefs.step),
     };
-    let measured = build(base, &outline, records, &beliefs, &sizes);
+    let measured = build(base, &outline, records, beliefs, &sizes);
     let values = |levels: &BTreeMap<String, f64>| -> Vec<f64> {
         let value = |level: &Level| {
             let own = level.declared.unwrap_or(0.0);
@@ -102,26 +115,59 @@ fn measured_equations(
 ) -> Result<Measured, FilterError> {
     let outline = base.outline();
     let theta = without_effects(&outline.parameters);
-    let size_of = |column: &dyn Fn(&Record) -> Vec<f64>| -> f64 {
-        records.iter().map(|r| size(&column(r))).fold(0.0, f64::max)
+    let size_of = |j: usize| -> Option<f64> {
+        let having = records.iter().filter(|record| record.has_output(j));
+        having
+            .map(|record| size(&record.outputs().column(j).to_vec()))
+            .reduce(f64::max)
     };
-    let outputs: Vec<f64> = (0..outline.outputs.len())
-        .map(|j| size_of(&|r| r.outputs().column(j).to_vec()))
-        .collect();
-    let fallback = outputs.iter().copied().fold(0.0, f64::max);
-    let mut sizes = Sizes {
-        states: free_motion(base, records, &theta, fallback),
+    let sizes: Vec<Option<f64>> = (0..outline.outputs.len()).map(size_of).collect();
+    let fallback = sizes.iter().flatten().copied().fold(0.0, f64::max);
+    let outputs: Vec<f64> = sizes.iter().map(|size| size.unwrap_or(fallback)).collect();
+    let starts = Starts::of(base, records, beliefs, &theta);
+    let widths = |widths: &[f64]| -> Vec<Option<f64>> {
+        (starts.unknown.iter().zip(widths))
+            .map(|(unknown, width)| unknown.then_some(*width))
+            .collect()
+    };
+    let motion = free_motion(base, records, &theta, fallback);
+    let mut sizes = RecordSizes {
+        starts: widths(&motion),
+        states: motion,
         outputs,
         declared: declared_levels(base, records, &theta, beliefs.step),
     };
+    let built = |sizes: &RecordSizes| build(base, &outline, records, beliefs, sizes);
     // States that follow the record tell their size better than a run that may drift away from it.
-    let loud = build(base, &outline, records, beliefs, &sizes);
-    if let Some(followed) = followed_motion(&loud, records, &theta)? {
+    if let Some(followed) = followed_motion(&built(&sizes), records, &theta)? {
         for (size, followed) in sizes.states.iter_mut().zip(followed) {
             if followed > 0.0 && followed.is_finite() {
                 *size = followed;
             }
         }
     }
-    Ok(build(base, &outline, records, beliefs, &sizes))
+    // A record at an operating point moves little, far from the twin's start: twice, since the first look is held back by its own prior.
+    let mut reach = sizes.states.clone();
+    for _ in 0..2 {
+        if !starts.unknown.contains(&true) {
+            break;
+        }
+        sizes.starts = widths(&reach);
+        let loud = built(&sizes);
+        let at = loud.begun_loud(&theta);
+        let Some(twin) = loud.twin.equations() else {
+            break;
+        };
+        let Some(distances) = distances(twin, records, &at)? else {
+            break;
+        };
+        for ((reach, size), distance) in reach.iter_mut().zip(&sizes.states).zip(distances) {
+            *reach = size.hypot(distance);
+        }
+    }
+    sizes.starts = widths(&reach);
+    Ok(Measured {
+        elsewhere: starts.elsewhere,
+        ..built(&sizes)
+    })
 }

@@ -58,9 +58,9 @@ fn visit_run(
     };
     let (limits, mut work) = (base.limits(), base.workspace());
     let mut x = vec![0.0; base.outline().states.len()];
-    base.start(&acting.at(0), &mut x);
+    base.run_to_first_row(&acting, &mut work, &mut x);
     visit(&acting.at(0), &x);
-    for k in 0..drive.samples() {
+    for k in (0..drive.samples()).filter(|&k| !acting.stands(k)) {
         let now = acting.at(k);
         base.step(&now, &mut x, &mut work);
         base.constrain(&now, &mut x);
@@ -117,9 +117,7 @@ pub(super) fn followed_motion(
     let Some(twin) = loud.twin.equations() else {
         return Ok(None);
     };
-    let theta: Vec<f64> = (theta.iter().copied())
-        .chain(loud.levels.iter().map(|level| level.loud))
-        .collect();
+    let theta = loud.begun_loud(theta);
     let settings = FilterSettings {
         keep_states: true,
         ..FilterSettings::default()

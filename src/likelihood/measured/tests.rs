@@ -67,7 +67,6 @@ fn undeclared_levels_come_from_the_record() {
     let twin = Composed::from(VanDerPol);
     let held = Beliefs {
         known: ["x2".to_owned()].into(),
-        starts: ["x1".to_owned()].into(),
         ..beliefs(0.05)
     };
     let measured = measured_equations(&twin, std::slice::from_ref(&record), &held).unwrap();
@@ -85,7 +84,54 @@ fn undeclared_levels_come_from_the_record() {
         .equations()
         .unwrap()
         .start_deviation(&now, &mut std);
-    assert!(std[0] == 0.0 && std[1] > 0.5, "{std:?}");
+    // The twin says its start, and the record agrees.
+    assert_eq!(std, [0.0; 2]);
+    assert_eq!(measured.elsewhere, None);
+}
+
+/// A start that the twin says is known, and given up where the first row is another one; a start that nobody says is unknown, as wide as the
+/// record is away from it. What the study says stands where the record begins at 0.
+#[test]
+fn starts_are_known_unless_a_record_says_otherwise() {
+    let deviations = |twin: &Composed, record: &Record, held: &Beliefs| {
+        let measured = measured_equations(twin, std::slice::from_ref(record), held).unwrap();
+        let space = measured.twin.parameters();
+        let (mut std, theta) = ([0.0; 2], space.centre());
+        let now = Now::new(0.0, 0.5, record.drive().input(0), &theta);
+        (measured.twin.equations().unwrap()).start_deviation(&now, &mut std);
+        (std, measured.elsewhere)
+    };
+    let swing = record(&VanDerPol, &[1.5], Drive::autonomous(0.05, 400).unwrap());
+    let later = Record::new(
+        Drive::autonomous(0.05, 300).unwrap(),
+        swing.outputs().slice(ndarray::s![60..360, ..]).to_owned(),
+    )
+    .unwrap();
+    let oscillator = Composed::from(VanDerPol);
+    let (std, elsewhere) = deviations(&oscillator, &later, &beliefs(0.05));
+    assert!(std[0] > 0.5 && std[1] > 0.5, "{std:?}");
+    let elsewhere = elsewhere.unwrap();
+    assert_eq!((elsewhere.expected, elsewhere.states.len()), (1.0, 2));
+    let held = Beliefs {
+        starts: ["x1".to_owned(), "x2".to_owned()].into(),
+        ..beliefs(0.05)
+    };
+    assert_eq!(deviations(&oscillator, &later, &held), ([0.0; 2], None));
+    let at_ten = later.drive().clone().beginning_at(10.0);
+    let at_ten = Record::new(at_ten, later.outputs().clone()).unwrap();
+    let (std, elsewhere) = deviations(&oscillator, &at_ten, &held);
+    assert!(std[0] > 0.5 && elsewhere.is_some(), "{std:?}");
+
+    // The tanks say nothing: at an operating point of 5 V their motion is a tenth of it.
+    let inputs = Signal::from_shape_fn((400, 1), |(k, _)| [1.45, 1.55][k / 20 % 2]);
+    let drive = Drive::new(0.5, inputs).unwrap();
+    let theta = [0.6, 0.6, 0.6, 1.0];
+    let whole = CascadedTanks.simulate(&theta, &drive, Noise::OFF).unwrap();
+    let rest = Drive::new(0.5, drive.inputs().slice(ndarray::s![200.., ..]).to_owned()).unwrap();
+    let rest = Record::new(rest, whole.slice(ndarray::s![200.., ..]).to_owned()).unwrap();
+    let (std, elsewhere) = deviations(&CascadedTanks.into(), &rest, &beliefs(0.5));
+    assert!(std[1] > 3.0 && std[0] > 1.0, "{std:?}");
+    assert_eq!(elsewhere, None);
 }
 
 /// A start that is wide forgets what the twin said: the likelihood of a record that began elsewhere is finite and near that of the

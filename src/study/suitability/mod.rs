@@ -23,7 +23,7 @@ use super::{Study, StudyError};
 use crate::likelihood::{measured, time_constants};
 use crate::math::three_digits;
 use crate::progress::Progress;
-use crate::record::{Drive, Record, Signal};
+use crate::record::{Drive, Quantity, Record, Signal};
 use crate::setting::number;
 use crate::twin::Noise;
 use crate::twin::conformance::{Finding, Severity};
@@ -74,7 +74,7 @@ impl Study {
                 parameters: vec![],
             });
         }
-        let mut findings = described(record);
+        let mut findings = described(record, &self.twin.signals().outputs);
         // A channel may have no value at the beginning; the whole record has one.
         let begin = record.first_part(record.samples().min(LOOKED_AT));
         let record = begin.unwrap_or_else(|| record.clone());
@@ -150,7 +150,7 @@ impl Study {
 }
 
 /// Length, step and gaps of a record.
-fn described(record: &Record) -> Vec<Finding> {
+fn described(record: &Record, outputs: &[Quantity]) -> Vec<Finding> {
     let drive = record.drive();
     let size = format!(
         "{} inputs, {} outputs, {} samples at {} s",
@@ -160,6 +160,24 @@ fn described(record: &Record) -> Vec<Finding> {
         text(drive.dt())
     );
     let mut findings = vec![Finding::pass("channels", size)];
+    let absent = |(j, _): &(usize, _)| !record.has_output(*j);
+    let absent: Vec<&str> = (outputs.iter().enumerate().filter(absent))
+        .map(|(_, output)| output.name.as_str())
+        .collect();
+    if !absent.is_empty() {
+        let message = format!(
+            "no value of {}: fits and diagnoses need another record that has it",
+            absent.join(", ")
+        );
+        findings.push(Finding::pass("sensors", message));
+    }
+    if drive.replicates() > 0 {
+        let message = format!(
+            "{} rows have the time of the row before: fits and diagnoses take them as readings of one state; an estimate needs one row a time",
+            drive.replicates()
+        );
+        findings.push(Finding::pass("replicates", message));
+    }
     if !record.is_complete() {
         let message = format!(
             "{} outputs are missing: fits and diagnoses leave them out; an estimate needs the record resampled",

@@ -51,7 +51,7 @@ pub(super) fn check(
     }
     let mut findings = vec![];
     let mut warn = |check, message| findings.push(Finding::warning(check, message));
-    if !drive.is_uniform() {
+    if drive.steps_vary() {
         let message = format!(
             "the steps vary; a fit takes them for a twin with equations, and so does a diagnosis where their median is the study's step; otherwise resample the record to {} s",
             text(step)
@@ -100,7 +100,7 @@ pub(super) fn in_seconds(record: Record, unit: f64) -> Result<Record, RecordErro
     }
     let drive = record.drive();
     let times: Vec<f64> = (0..record.samples())
-        .map(|k| drive.time(k) / unit)
+        .map(|k| drive.own_time(k) / unit)
         .collect();
     let drive = Drive::with_times(&times, drive.inputs().clone())?;
     Record::new(drive, record.outputs().clone())

@@ -123,7 +123,7 @@ impl From<NoiseLevel> for NoiseText {
     }
 }
 
-/// A state at the first sample: `2.0`, `{ mean = 2.0, std = 0.5 }`, or `"estimate"`.
+/// A state at the first row: `2.0`, `{ mean = 2.0, std = 0.5 }`, or `"estimate"`; or at a time before it: `{ value = 2.0, at = 0.0 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "StartText", into = "StartText")]
 pub(crate) enum StartLevel {
@@ -133,15 +133,26 @@ pub(crate) enum StartLevel {
         mean: f64,
         /// Standard deviation, in units of the state.
         std: f64,
+        /// Time that it belongs to, in seconds on the record's own clock; that of the first row if not given.
+        at: Option<f64>,
     },
     /// Unknown: it becomes a parameter, which an estimator learns.
     Estimate,
 }
 
 impl StartLevel {
+    /// A start that is known at the first row.
+    pub(crate) fn known(value: f64) -> Self {
+        Self::Declared {
+            mean: value,
+            std: 0.0,
+            at: None,
+        }
+    }
+
     /// Checks numbers of the start of `name`, whose limits are `limit`.
     pub(super) fn check(self, name: &str, limit: crate::twin::Interval) -> Result<(), TwinError> {
-        let Self::Declared { mean, std } = self else {
+        let Self::Declared { mean, std, at } = self else {
             return Ok(());
         };
         let wrong = |value, remedy| TwinError::Value {
@@ -156,19 +167,34 @@ impl StartLevel {
         if !(std >= 0.0 && std.is_finite()) {
             return Err(wrong(std, "a standard deviation is 0 or more"));
         }
-        Ok(())
+        match at {
+            Some(at) if !at.is_finite() => Err(wrong(
+                at,
+                "at is a time in seconds on the record's own clock",
+            )),
+            _ => Ok(()),
+        }
     }
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "expected a number, { mean = .., std = .. }, or \"estimate\""
+    expecting = "expected a number, { value = .., at = .. }, { mean = .., std = .. }, or \"estimate\""
 )]
 enum StartText {
     Number(f64),
+    Value(StartValue),
     Table(StartTable),
     Word(Word),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StartValue {
+    value: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    at: Option<f64>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -176,13 +202,20 @@ enum StartText {
 struct StartTable {
     mean: f64,
     std: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    at: Option<f64>,
 }
 
 impl From<StartText> for StartLevel {
     fn from(text: StartText) -> Self {
         match text {
-            StartText::Number(mean) => Self::Declared { mean, std: 0.0 },
-            StartText::Table(StartTable { mean, std }) => Self::Declared { mean, std },
+            StartText::Number(mean) => Self::known(mean),
+            StartText::Value(StartValue { value, at }) => Self::Declared {
+                mean: value,
+                std: 0.0,
+                at,
+            },
+            StartText::Table(StartTable { mean, std, at }) => Self::Declared { mean, std, at },
             StartText::Word(Word::Estimate) => Self::Estimate,
         }
     }
@@ -191,8 +224,17 @@ impl From<StartText> for StartLevel {
 impl From<StartLevel> for StartText {
     fn from(level: StartLevel) -> Self {
         match level {
-            StartLevel::Declared { mean, std: 0.0 } => Self::Number(mean),
-            StartLevel::Declared { mean, std } => Self::Table(StartTable { mean, std }),
+            StartLevel::Declared {
+                mean,
+                std: 0.0,
+                at: None,
+            } => Self::Number(mean),
+            StartLevel::Declared {
+                mean: value,
+                std: 0.0,
+                at,
+            } => Self::Value(StartValue { value, at }),
+            StartLevel::Declared { mean, std, at } => Self::Table(StartTable { mean, std, at }),
             StartLevel::Estimate => Self::Word(Word::Estimate),
         }
     }
@@ -214,6 +256,8 @@ mod tests {
             "h = 0.1\nx = 2.0\n",
             "h = \"estimate\"\nx = \"estimate\"\n",
             "[h]\nstd = 0.1\nknown = true\nper = \"second\"\n\n[x]\nmean = 2.0\nstd = 0.5\n",
+            "h = 0.1\n\n[x]\nvalue = 2.0\nat = -1.5\n",
+            "h = 0.1\n\n[x]\nmean = 2.0\nstd = 0.5\nat = 0.0\n",
         ] {
             let file: File = toml::from_str(text).unwrap();
             assert_eq!(toml::to_string(&file).unwrap(), text);

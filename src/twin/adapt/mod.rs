@@ -46,24 +46,23 @@ pub(crate) fn adapt(base: Twin, adaptation: &Adaptation, step: f64) -> Result<Tw
     twin.with_space(|space| rebox(space, adaptation))
 }
 
-/// The twin begun at known states, each within its limits; `None` for a black box.
-pub(crate) fn begun(twin: &Twin, states: &[f64], step: f64) -> Option<Twin> {
+/// The twin begun at known states, each within its limits; a black box as it is.
+pub(crate) fn begun(twin: &Twin, states: &[f64], step: f64) -> Result<Twin, TwinError> {
     let Twin::Equations(base) = twin else {
-        return None;
+        return Ok(twin.clone());
     };
     let names = base.outline().states.into_iter().map(|state| state.name);
     let start = (names.zip(base.limits()).zip(states))
         .filter(|((name, _), _)| !is_memory(name))
-        .map(|((name, limit), state)| {
-            let mean = limit.clamp(*state);
-            (name, StartLevel::Declared { mean, std: 0.0 })
-        })
+        .map(|((name, limit), state)| (name, StartLevel::known(limit.clamp(*state))))
         .collect();
     let adaptation = Adaptation {
         start,
         ..Adaptation::default()
     };
-    adapt(twin.clone(), &adaptation, step).ok()
+    // They are those of the first row, wherever the twin's own start belongs.
+    let begun = adapt(twin.clone(), &adaptation, step)?;
+    Ok(begun.with([], vec![TwinPart::Begins(None)]))
 }
 
 fn check_black_box(adaptation: &Adaptation) -> Result<(), TwinError> {
@@ -123,11 +122,26 @@ fn adapt_equations(
             step,
         });
     }
+    let mut begins: Option<f64> = None;
     for (state, name, level) in indexed("start", &adaptation.start, &states)? {
         let limit = limits[state];
         level.check(name, limit)?;
         let (mean, std) = match level {
-            StartLevel::Declared { mean, std } => (LevelValue::Known(mean), std),
+            StartLevel::Declared { mean, std, at } => {
+                if let (Some(at), Some(other)) = (at, begins.or(at)) {
+                    let remedy = "all states start at one time: give the same at, once or in each";
+                    if at != other {
+                        return Err(TwinError::Value {
+                            table: "start",
+                            name: name.into(),
+                            value: at,
+                            remedy,
+                        });
+                    }
+                    begins = Some(at);
+                }
+                (LevelValue::Known(mean), std)
+            }
             StartLevel::Estimate => {
                 let guess = Some(limit).filter(|limit| limit.is_finite());
                 added.push(unknown(adaptation, Role::Start, name, guess)?);
@@ -135,6 +149,9 @@ fn adapt_equations(
             }
         };
         parts.push(TwinPart::Start { state, mean, std });
+    }
+    if begins.is_some() {
+        parts.push(TwinPart::Begins(begins));
     }
     Ok(twin.with(added, parts))
 }
@@ -219,7 +236,11 @@ fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(),
     for (index, _, bounds) in indexed("bounds", &adaptation.bounds, &names)? {
         parameters[index].bounds = bounds;
     }
-    parameters.check()
+    // A study may hold all parameters.
+    match parameters.is_empty() {
+        true => Ok(()),
+        false => parameters.check(),
+    }
 }
 
 /// Holds the named parameters of a twin; θ is shorter by them.

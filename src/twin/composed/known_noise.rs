@@ -102,10 +102,10 @@ impl SensorNoise {
         drive: &Drive,
         run: impl FnOnce() -> Result<Signal, SimulationError>,
     ) -> Result<Signal, SimulationError> {
-        let dt = drive.dt();
+        let (dt, first_time) = (drive.dt(), drive.first_time());
         let numbers = theta[..self.entries]
             .iter()
-            .chain([&dt])
+            .chain([&dt, &first_time])
             .chain(drive.inputs());
         let key: Vec<u64> = numbers
             .map(|v| v.to_bits())

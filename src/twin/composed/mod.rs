@@ -30,7 +30,7 @@ pub(crate) use part::{
     Disturbance, Entry, FittedLevels, LARGEST, Law, LawPart, LawPlace, LevelSource, LevelValue,
     ParameterChange, RateChange, SignalChange, StateLimit, TwinPart,
 };
-pub(crate) use simulation::{Acting, DeadTime};
+pub(crate) use simulation::{Acting, DeadTime, check_start};
 
 use crate::record::{Drive, Signal};
 use crate::twin::integrator::felt;
@@ -116,6 +116,11 @@ impl Composed {
     /// Returns whether this is another handle of the same twin.
     pub(crate) fn is(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.own, &other.own) && Arc::ptr_eq(&self.parts, &other.parts)
+    }
+
+    /// Returns the time that the start belongs to, on the record's own clock; `None` for that of the first row.
+    pub(crate) fn begins(&self) -> Option<f64> {
+        self.parts.begins
     }
 
     /// Returns the number of states.

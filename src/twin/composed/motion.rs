@@ -66,7 +66,7 @@ impl Composed {
             match &added.part {
                 TwinPart::Law(part) => {
                     if let Law::Force(law) = &part.law {
-                        let t = self.parts.time(now, added.delays);
+                        let t = self.parts.law_time(now, added.delays);
                         let (seen, on) = (Now { t, ..*own }, part.place(&added.states));
                         law.push(part.m(now.theta), &seen, &on, (at, x), dx);
                     }

@@ -287,6 +287,8 @@ pub(crate) enum TwinPart {
         mean: LevelValue,
         std: f64,
     },
+    /// Time that the start belongs to, on the record's own clock; `None` for that of the first row.
+    Begins(Option<f64>),
     /// Standard deviation of a start for which none is declared.
     UncertainStart { state: usize, std: f64 },
     /// A disturbance, for which equations have a state more.

@@ -49,6 +49,8 @@ pub(in crate::twin) struct Parts {
     delays: Vec<Vec<usize>>,
     /// Step at which the twin's own noise is asked.
     pub noise_step: Option<f64>,
+    /// Time that the start belongs to, on the record's own clock; `None` for that of the first row.
+    pub begins: Option<f64>,
     pub acts: Acts,
 }
 
@@ -138,6 +140,7 @@ impl Parts {
             list: vec![],
             delays: vec![],
             noise_step: None,
+            begins: None,
             acts: Acts::default(),
         }
     }
@@ -236,6 +239,7 @@ impl Parts {
         let (from, delays) = (self.outline.states.len(), self.delays.len());
         match &part {
             TwinPart::Box { state, limit } => self.limits[*state] = *limit,
+            TwinPart::Begins(at) => self.begins = *at,
             TwinPart::Steps(integrator, stepping) => {
                 (self.integrator, self.stepping) = (*integrator, *stepping);
             }
@@ -303,7 +307,7 @@ impl Parts {
         self.delays[delay].iter().map(|&j| theta[j]).sum()
     }
 
-    /// Returns the time that is seen behind the delays from this index on.
+    /// Returns the time on the record's own clock that is seen behind the delays from this index on: never before the start.
     #[inline]
     pub fn time(&self, now: &Now<'_>, delays: usize) -> f64 {
         if delays >= self.delays.len() {
@@ -312,20 +316,26 @@ impl Parts {
         let delays = delays..self.delays.len();
         delays
             .fold(now.t, |t, delay| t - self.delay(delay, now.theta))
-            .max(0.0)
+            .max(now.begun)
+    }
+
+    /// Returns the time from the first row that laws see behind the delays from this index on; 0 before it.
+    #[inline]
+    pub fn law_time(&self, now: &Now<'_>, delays: usize) -> f64 {
+        (self.time(now, delays) - now.first_time).max(0.0)
     }
 
     /// Returns `now` as laws of signals and parameters see it: behind the delays from this index on, with no θ but their magnitudes.
     #[inline]
     pub fn behind<'n>(&self, now: &Now<'n>, delays: usize) -> Now<'n> {
-        let t = self.time(now, delays);
+        let t = self.law_time(now, delays);
         let theta = &[];
         Now { t, theta, ..*now }
     }
 
     /// Returns the share of a step in which what is behind a delay moves; `None` for all of it.
     pub fn moving(&self, now: &Now<'_>, delay: usize) -> Option<f64> {
-        let t = self.time(now, delay + 1);
+        let t = self.time(now, delay + 1) - now.begun;
         let share = (t + now.dt - self.delay(delay, now.theta)) / now.dt;
         (share < 1.0).then_some(share.max(0.0))
     }

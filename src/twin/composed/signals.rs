@@ -1,10 +1,10 @@
 //! Outputs, starts and inputs of composed equations.
 
 use super::parts::{Added, Theta};
-use super::{Composed, Disturbance, Entry, Law, LawPart, LawPlace, SignalChange, TwinPart};
+use super::{Acting, Composed, Disturbance, Entry, Law, LawPart, LawPlace, SignalChange, TwinPart};
 use crate::record::{Drive, RecordError, Signal};
 use crate::twin::points::Layout;
-use crate::twin::{Now, SimulationError};
+use crate::twin::{Now, SimulationError, Workspace};
 use smallvec::SmallVec;
 
 /// Outputs of points that are kept on the stack.
@@ -131,10 +131,29 @@ impl Composed {
         })
     }
 
-    /// Sets the first state.
+    /// Sets `x` to the state at the first row, from the start on without noise.
+    pub(crate) fn run_to_first_row(
+        &self,
+        acting: &Acting<'_>,
+        work: &mut Workspace,
+        x: &mut [f64],
+    ) {
+        self.start(&acting.start(), x);
+        for i in 0..acting.steps_before() {
+            let now = acting.before(i);
+            self.step(&now, x, work);
+            self.constrain(&now, x);
+            for (x, limit) in x.iter_mut().zip(self.limits()) {
+                *x = limit.clamp(*x);
+            }
+        }
+    }
+
+    /// Sets the state that a run begins with.
     pub fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         self.resolved(now, |now| {
             let (own, added) = x.split_at_mut(self.parts.states);
+            own.fill(0.0);
             self.inside(now, None, |now| self.own.start(now, own));
             added.fill(0.0);
             for added in &self.parts.list {
@@ -144,6 +163,17 @@ impl Composed {
             }
             self.begin(now, x);
         });
+    }
+
+    /// Returns which states the user's code sets a start of; the others are silent.
+    pub(crate) fn written_starts(&self, now: &Now<'_>) -> Vec<bool> {
+        let mut x = vec![f64::NAN; self.parts.states];
+        self.resolved(now, |now| {
+            self.inside(now, None, |now| self.own.start(now, &mut x));
+        });
+        let mut written: Vec<bool> = x.iter().map(|x| !x.is_nan()).collect();
+        written.resize(self.states(), true);
+        written
     }
 
     /// Sets the states that follow from the others at the first sample: memories, to the first values of their signals.
@@ -256,8 +286,14 @@ impl LawPart {
         let at = Layout::dense(self.memory.max(1));
         memory.resize(self.memory.max(1), 0.0);
         for (k, value) in signal.column_mut(self.target).iter_mut().enumerate() {
-            let now = Now::new(drive.time(k), drive.step(k), drive.input(k), &[]);
             let value = std::slice::from_mut(value);
+            let mut now = Now::new(drive.time(k), drive.step(k), drive.input(k), &[]);
+            if drive.is_repeated(k) {
+                // Memories advance once to the next time.
+                now.dt = drive.dt();
+                law.peek(self.m(theta), &now, &on, (at, &memory), (1, value));
+                continue;
+            }
             law.pass(self.m(theta), &now, &on, (at, &mut memory), (1, value));
         }
     }

@@ -3,6 +3,7 @@
 use super::Composed;
 use super::parts::Theta;
 use crate::record::{Drive, Signal};
+use crate::setting::number;
 use crate::twin::integrator::Between;
 use crate::twin::{Hold, Interval, Noise, Now, Outline, SimulationError, Workspace};
 use std::borrow::Cow;
@@ -34,12 +35,61 @@ pub(super) fn check_lengths(
     Ok(())
 }
 
+/// Most steps from the start to the first row: a pass over the record takes them, too. A thousand records of a thousand rows; with ten times
+/// as many a fit takes hours, a tenth cuts off what a slow system still feels.
+const MOST_BEFORE: f64 = 1e6;
+/// Share of a step within which the start and the first row are the same.
+const SAME: f64 = 1e-6;
+
+/// Steps from the start to the first row of a drive, of Δt but for a shorter first one.
+#[derive(Debug, Clone, Copy)]
+struct LeadIn {
+    begun: f64,
+    steps: usize,
+    /// Length of the first step.
+    first: f64,
+}
+
+impl LeadIn {
+    /// From a start at this time; an error where it is after the first row, or too long before it.
+    fn of(drive: &Drive, begun: f64) -> Result<Self, String> {
+        let (first_row, dt) = (drive.first_time(), drive.dt());
+        let steps = ((first_row - begun) / dt - SAME).ceil();
+        if first_row - begun < -SAME * dt {
+            return Err(format!(
+                "the start belongs to {} s, after the first row at {} s; give the time of that row or an earlier one",
+                number(begun),
+                number(first_row)
+            ));
+        }
+        if !(steps <= MOST_BEFORE) {
+            return Err(format!(
+                "the start belongs to {} s, {steps} steps before the first row at {} s; at most {MOST_BEFORE} are run: give a later time",
+                number(begun),
+                number(first_row)
+            ));
+        }
+        let steps = steps.max(0.0);
+        Ok(Self {
+            begun,
+            steps: steps as usize,
+            first: first_row - begun - (steps - 1.0) * dt,
+        })
+    }
+}
+
 /// A drive as the equations of a twin see it at θ.
 pub(crate) struct Acting<'d> {
     drive: Cow<'d, Drive>,
     hold: Hold,
     /// All of θ, held entries too.
     theta: Theta,
+    before: LeadIn,
+}
+
+/// Checks that the start of a twin does not belong to a time after the first row of a drive.
+pub(crate) fn check_start(twin: &Composed, drive: &Drive) -> Result<(), String> {
+    (twin.begins()).map_or(Ok(()), |begun| LeadIn::of(drive, begun).map(drop))
 }
 
 impl<'d> Acting<'d> {
@@ -49,7 +99,9 @@ impl<'d> Acting<'d> {
             Some(actuated) => Cow::Owned(actuated),
             None => Cow::Borrowed(drive),
         };
+        let begun = twin.begins().unwrap_or(drive.first_time());
         Ok(Self {
+            before: LeadIn::of(&drive, begun).map_err(SimulationError::fatal)?,
             drive,
             hold: twin.stepping().hold,
             theta: twin.complete(theta),
@@ -62,7 +114,43 @@ impl<'d> Acting<'d> {
             drive: Cow::Borrowed(drive),
             hold,
             theta: Theta::from_slice(theta),
+            before: LeadIn {
+                begun: drive.first_time(),
+                steps: 0,
+                first: drive.dt(),
+            },
         }
+    }
+
+    /// Number of steps from the start to the first row.
+    pub fn steps_before(&self) -> usize {
+        self.before.steps
+    }
+
+    /// The start: the first row, or an earlier time with its inputs.
+    pub fn start(&self) -> Now<'_> {
+        match self.before.steps {
+            0 => self.at(0),
+            _ => self.before(0),
+        }
+    }
+
+    /// Step i from the start to the first row, whose inputs are held.
+    pub fn before(&self, i: usize) -> Now<'_> {
+        let (dt, before) = (self.drive.dt(), self.before);
+        let mut now = self.at(0);
+        now.between = None;
+        (now.t, now.dt) = match i {
+            0 => (before.begun, before.first),
+            i => (now.t - (before.steps - i) as f64 * dt, dt),
+        };
+        now
+    }
+
+    /// Returns whether row k + 1 is another reading of the state of row k, to which nothing moves.
+    #[inline(always)]
+    pub fn stands(&self, k: usize) -> bool {
+        self.drive.is_repeated(k)
     }
 
     /// Number of samples.
@@ -78,7 +166,11 @@ impl<'d> Acting<'d> {
     /// Row k. The last input is held.
     #[inline]
     pub fn at(&self, k: usize) -> Now<'_> {
-        let mut now = Now::new(0.0, 0.0, &[], &self.theta);
+        let mut now = Now {
+            first_time: self.drive.first_time(),
+            begun: self.before.begun,
+            ..Now::new(0.0, 0.0, &[], &self.theta)
+        };
         self.go_to(k, &mut now);
         now
     }
@@ -87,7 +179,11 @@ impl<'d> Acting<'d> {
     #[inline(always)]
     pub fn go_to<'a>(&'a self, k: usize, now: &mut Now<'a>) {
         let drive = self.drive.as_ref();
-        (now.t, now.dt, now.u) = (drive.time(k), drive.step(k), drive.input(k));
+        (now.t, now.dt, now.u) = (drive.own_time(k), drive.step(k), drive.input(k));
+        if now.dt == 0.0 {
+            // Nothing moves to a replicate; what is asked here is asked at a usual step.
+            now.dt = drive.dt();
+        }
         if self.hold != Hold::Zero {
             let next = drive.input((k + 1).min(drive.samples() - 1));
             now.between = Some(Between {
@@ -175,10 +271,38 @@ pub(super) fn simulate(
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let mut x = vec![0.0; n];
     let mut outputs = vec![0.0; samples * p];
-    let first = acting.at(0);
+    // One step, and the noise of it.
+    let mut carry = |now: &Now<'_>, q: &[f64], x: &mut [f64]| {
+        twin.step(now, x, &mut work);
+        if !noise.is_off() {
+            for ((x, q), w) in x.iter_mut().zip(q).zip(&mut process) {
+                if *q != 0.0 {
+                    *x += q * w.normal();
+                }
+            }
+        }
+        twin.constrain(now, x);
+        for &(i, limit) in &limits {
+            x[i] = limit.clamp(x[i]);
+        }
+        match x.iter().all(|v| v.is_finite()) {
+            true => Ok(()),
+            false => Err(SimulationError::Diverged { at: now.t + now.dt }),
+        }
+    };
+    let first = acting.start();
     twin.start(&first, &mut x);
     if !noise.is_off() {
         draw_start(twin, &first, (outline, &limits), noise, &mut x);
+    }
+    for i in 0..acting.steps_before() {
+        let now = acting.before(i);
+        if !noise.is_off() {
+            q.fill(0.0);
+            r.fill(0.0);
+            twin.noise(&now, &x, &mut q, &mut r);
+        }
+        carry(&now, &q, &mut x)?;
     }
     for k in 0..samples {
         let now = acting.at(k);
@@ -199,20 +323,8 @@ pub(super) fn simulate(
         if !y.iter().all(|v| v.is_finite()) {
             return Err(SimulationError::Diverged { at: now.t });
         }
-        twin.step(&now, &mut x, &mut work);
-        if !noise.is_off() {
-            for ((x, q), w) in x.iter_mut().zip(&q).zip(&mut process) {
-                if *q != 0.0 {
-                    *x += q * w.normal();
-                }
-            }
-        }
-        twin.constrain(&now, &mut x);
-        for &(i, limit) in &limits {
-            x[i] = limit.clamp(x[i]);
-        }
-        if !x.iter().all(|v| v.is_finite()) {
-            return Err(SimulationError::Diverged { at: now.t + now.dt });
+        if !acting.stands(k) {
+            carry(&now, &q, &mut x)?;
         }
     }
     Signal::from_shape_vec((samples, p), outputs)

@@ -95,21 +95,28 @@ fn step_levels(
         .collect())
 }
 
-/// Root mean square of what noise adds to each output.
+/// Root mean square of what noise adds to each output; 0 where every noisy run diverges.
 fn scatter(
     twin: &Composed,
     theta: &[f64],
     drive: &Drive,
     run: &Signal,
 ) -> Result<Vec<f64>, SimulationError> {
-    let mut squares = vec![0.0; run.ncols()];
+    let (mut squares, mut runs) = (vec![0.0; run.ncols()], 0.0);
     for draw in 0..NOISY_RUNS {
-        let moved = twin.run(theta, drive, Noise::new(0, "scatter", draw))? - run;
+        // Loud noise may drive a run out of the numbers that a run without noise keeps: that says nothing of the step.
+        let moved = match twin.run(theta, drive, Noise::new(0, "scatter", draw)) {
+            Ok(noisy) => noisy - run,
+            Err(error) if error.costs_one_run() => continue,
+            Err(error) => return Err(error),
+        };
+        runs += 1.0;
         for (square, column) in squares.iter_mut().zip(moved.columns()) {
-            *square += column.mapv(|d| d * d).mean().unwrap_or(0.0) / NOISY_RUNS as f64;
+            *square += column.mapv(|d| d * d).mean().unwrap_or(0.0);
         }
     }
-    Ok(squares.into_iter().map(f64::sqrt).collect())
+    let mean = |square: f64| (square / f64::max(runs, 1.0)).sqrt();
+    Ok(squares.into_iter().map(mean).collect())
 }
 
 #[cfg(test)]

@@ -67,3 +67,65 @@ fn common_noise_pairs_runs_at_different_parameters() {
     let b = Walk.simulate(&[-1.0 + 1e-9], &drive(50), noise).unwrap();
     assert!((&a - &b).iter().all(|d| d.abs() < 1e-7));
 }
+
+/// ẋ = t on the record's own clock, y = x; starts at 1.
+struct Clock;
+impl StateSpace for Clock {
+    fn outline(&self) -> Outline {
+        Outline::new()
+            .parameter(Parameter::new("none", "1", 0.5, 1.5))
+            .state("x", "m")
+            .output("y", "m")
+    }
+    fn drift(&self, now: &Now<'_>, _: &[f64], dx: &mut [f64]) {
+        dx[0] = now.t;
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y[0] = x[0];
+    }
+    fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+        x[0] = 1.0;
+    }
+    fn integrator(&self) -> crate::twin::Integrator {
+        crate::twin::Integrator::RungeKutta4
+    }
+}
+
+/// Equations see the time of the rows; a start before the first row is run to it, in steps of Δt but for a shorter first one.
+#[test]
+fn equations_see_the_records_own_time() {
+    use crate::twin::{Adaptation, StartLevel, Twin, adapt};
+    let late = drive(30).beginning_at(100.0);
+    let y = Clock.simulate(&[1.0], &late, Noise::OFF).unwrap();
+    let expected = |from: f64, start: f64, k: usize| {
+        let t = late.own_time(k);
+        start + 0.5 * (t * t - from * from)
+    };
+    assert!((y[[29, 0]] - expected(100.0, 1.0, 29)).abs() < 1e-9);
+    let begun = |at| {
+        let start = StartLevel::Declared {
+            mean: 2.0,
+            std: 0.0,
+            at: Some(at),
+        };
+        let adaptation = Adaptation {
+            start: [("x".to_owned(), start)].into(),
+            ..Adaptation::default()
+        };
+        adapt(Twin::new(Clock), &adaptation, 0.1).unwrap()
+    };
+    for at in [99.97, 97.0, 100.0] {
+        let y = begun(at).simulate(&[1.0], &late, Noise::OFF).unwrap();
+        for k in [0, 29] {
+            assert!((y[[k, 0]] - expected(at, 2.0, k)).abs() < 1e-9, "{at} {k}");
+        }
+    }
+    let problem = begun(100.2).check_drive(&late).unwrap_err().to_string();
+    assert!(
+        problem.contains("100.2 s, after the first row at 100 s"),
+        "{problem}"
+    );
+    let problem = begun(-1e9).check_drive(&late).unwrap_err().to_string();
+    assert!(problem.contains("steps before the first row"), "{problem}");
+    assert!(begun(0.0).check_drive(&late).is_ok());
+}

@@ -1,0 +1,190 @@
+//! Starts of records: known, unknown, or known and not those of these records.
+//!
+//! A start is known if the twin's code or the study says it. A start that nobody says is unknown; so is one for which a record shows that it began
+//! elsewhere, at an operating point, say:
+//!
+//! ```text
+//! |y(0) − g(x_0, θ)| > 5·s   for all θ within the bounds          s: declared noise of the output, or what its second differences show
+//! ```
+
+use super::level::{Beliefs, StartElsewhere};
+use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
+use crate::math::median;
+use crate::record::Record;
+use crate::twin::{Acting, Composed, Now, is_memory};
+
+/// Distance of the first row from the start, in deviations of the noise, beyond which the record began elsewhere. At half of it a right start is
+/// given up in one of eighty records; at twice of it a wrong one of ten deviations is believed.
+const ELSEWHERE: f64 = 5.0;
+/// Median absolute second difference of white noise, in its standard deviations: 0.6745·√6.
+const SECOND_DIFFERENCE: f64 = 1.652;
+
+/// Starts of a twin in these records.
+pub(super) struct Starts {
+    /// `true` where the start of the state is unknown.
+    pub unknown: Vec<bool>,
+    /// Contradiction of a start that was said.
+    pub elsewhere: Option<StartElsewhere>,
+}
+
+impl Starts {
+    pub fn of(twin: &Composed, records: &[Record], beliefs: &Beliefs, theta: &[f64]) -> Self {
+        let names: Vec<String> = (twin.outline().states.into_iter())
+            .map(|state| state.name)
+            .collect();
+        let drive = records[0].drive();
+        let now = Now::new(drive.first_time(), drive.dt(), drive.input(0), theta);
+        let written = twin.written_starts(&now);
+        let is_declared = |name: &String| beliefs.starts.contains(name);
+        let mut unknown: Vec<bool> = (names.iter().zip(&written))
+            .map(|(name, written)| {
+                let is_said = *written && !beliefs.estimated.contains(name);
+                !(is_declared(name) || is_memory(name) || is_said)
+            })
+            .collect();
+        let mut elsewhere = None;
+        for (r, record) in records.iter().enumerate() {
+            // Of records that begin at 0, the study's own word stands; at another time, it may be that of a start before the record.
+            let stands = record.drive().first_time() == 0.0 || twin.begins().is_some();
+            let given_up: Vec<usize> = (0..names.len())
+                .filter(|&i| !unknown[i] && !is_memory(&names[i]))
+                .filter(|&i| {
+                    !(is_declared(&names[i]) && (stands || beliefs.wide.contains(&names[i])))
+                })
+                .collect();
+            let Some((output, value, expected)) =
+                contradiction((twin, &unknown), record, theta).filter(|_| !given_up.is_empty())
+            else {
+                continue;
+            };
+            given_up.iter().for_each(|&i| unknown[i] = true);
+            elsewhere.get_or_insert(StartElsewhere {
+                record: r,
+                output: twin.outline().outputs[output].clone(),
+                value,
+                expected,
+                states: given_up.iter().map(|&i| names[i].clone()).collect(),
+            });
+        }
+        Self { unknown, elsewhere }
+    }
+}
+
+/// Output whose value in the first row no θ within the bounds starts at, the value, and the nearest one that is possible.
+fn contradiction(
+    (twin, unknown): (&Composed, &[bool]),
+    record: &Record,
+    theta: &[f64],
+) -> Option<(usize, f64, f64)> {
+    let outline = twin.outline();
+    let (n, p) = (outline.states.len(), outline.outputs.len());
+    if twin.begins().is_some() {
+        // The equations lead to the first row: what they say depends on θ.
+        return None;
+    }
+    let mut range = vec![(f64::INFINITY, f64::NEG_INFINITY); p];
+    let mut noise = vec![0.0; p];
+    let mut look = |theta: &[f64]| {
+        // A twin that does not work there says nothing.
+        let Ok(acting) = Acting::of(twin, theta, record.drive()) else {
+            return;
+        };
+        let now = acting.start();
+        let (mut x, mut y) = (vec![0.0; n], vec![0.0; p]);
+        let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
+        twin.start(&now, &mut x);
+        twin.observe(&now, &x, &mut y);
+        twin.readout(&now, &mut y);
+        twin.noise(&now, &x, &mut q, &mut r);
+        let mut std = vec![0.0; n];
+        twin.start_deviation(&now, &mut std);
+        for j in 0..p {
+            range[j] = (range[j].0.min(y[j]), range[j].1.max(y[j]));
+            noise[j] = f64::max(noise[j], r[j]);
+        }
+        for i in 0..n {
+            // An unknown state may be anywhere.
+            let reach = if unknown[i] { 1.0 } else { ELSEWHERE * std[i] };
+            for reach in [reach, -reach].into_iter().filter(|reach| *reach != 0.0) {
+                let (mut moved, mut there) = (x.clone(), vec![0.0; p]);
+                moved[i] += reach;
+                twin.observe(&now, &moved, &mut there);
+                twin.readout(&now, &mut there);
+                for j in 0..p {
+                    range[j] = (range[j].0.min(there[j]), range[j].1.max(there[j]));
+                    if unknown[i] && there[j] != y[j] {
+                        noise[j] = f64::INFINITY;
+                    }
+                }
+            }
+        }
+    };
+    look(theta);
+    for (j, parameter) in outline.parameters.iter().enumerate() {
+        for (bound, prior) in [
+            (parameter.bounds.low(), parameter.prior.low()),
+            (parameter.bounds.high(), parameter.prior.high()),
+        ] {
+            let mut moved = theta.to_vec();
+            moved[j] = if bound.is_finite() { bound } else { prior };
+            look(&moved);
+        }
+    }
+    let rows = (0..record.samples()).take_while(|&k| k == 0 || record.drive().is_repeated(k - 1));
+    for k in rows {
+        for j in 0..p {
+            let (low, high) = range[j];
+            let value = record.outputs()[[k, j]];
+            let expected = value.max(low).min(high);
+            let values = record.outputs().column(j).to_vec();
+            let reach = ELSEWHERE
+                * noise[j]
+                    .max(roughness(&values))
+                    .max(record.cells()[j].sqrt());
+            if (value - expected).abs() > reach {
+                return Some((j, value, expected));
+            }
+        }
+    }
+    None
+}
+
+/// Deviation of white noise with second differences like those of a signal: an upper bound of its noise.
+fn roughness(values: &[f64]) -> f64 {
+    let second: Vec<f64> = (values.windows(3))
+        .map(|v| (v[2] - 2.0 * v[1] + v[0]).abs())
+        .filter(|d| d.is_finite())
+        .collect();
+    median(&second).unwrap_or(f64::INFINITY) / SECOND_DIFFERENCE
+}
+
+/// Largest distance of each state in a first row from its start, as a smoother with loud noise sees it beyond its own uncertainty; `None` where it
+/// cannot.
+pub(super) fn distances(
+    twin: &Composed,
+    records: &[Record],
+    theta: &[f64],
+) -> Result<Option<Vec<f64>>, FilterError> {
+    let settings = FilterSettings::default();
+    let n = twin.outline().states.len();
+    let mut all = vec![0.0; n];
+    for record in records {
+        let smoothed = Kalman::new(twin, record, &settings)?.smooth(theta);
+        let Some(smoothed) = recoverable(smoothed)? else {
+            return Ok(None);
+        };
+        let mut start = vec![0.0; n];
+        let Ok(acting) = Acting::of(twin, theta, record.drive()) else {
+            continue;
+        };
+        twin.run_to_first_row(&acting, &mut twin.workspace(), &mut start);
+        for (i, distance) in all.iter_mut().enumerate() {
+            let off = smoothed.means[[0, i]] - start[i];
+            let beyond = off * off - smoothed.covariances[[0, i, i]];
+            if beyond.is_finite() {
+                *distance = f64::max(*distance, beyond.max(0.0).sqrt());
+            }
+        }
+    }
+    Ok(Some(all))
+}
