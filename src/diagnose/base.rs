@@ -2,7 +2,7 @@
 
 use super::candidates;
 use super::settings::{Ablation, DiagnoseSettings};
-use super::step::FinerStep;
+use super::step::OtherStep;
 use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::climb::{climb, fit};
@@ -37,7 +37,7 @@ pub(in crate::diagnose) struct Base {
     /// Nats of evidence that these kinds gained.
     pub noise_gain: f64,
     /// The finer step that the records asked for.
-    pub step: Option<FinerStep>,
+    pub step: Option<OtherStep>,
 }
 
 impl Base {

@@ -17,6 +17,7 @@ use super::quantify::power::power;
 use super::quantify::share::{Measures, shrinkage};
 use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
+use super::step::OtherStep;
 use super::thresholds::Thresholds;
 use crate::fit::Warning;
 use crate::fit::posterior::{PosteriorSample, posterior};
@@ -29,6 +30,7 @@ use crate::likelihood::start_elsewhere;
 use crate::progress::{Progress, Stage};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
+use crate::twin::Hold;
 
 /// A search and what its report is to hold.
 pub(super) struct Report<'d> {
@@ -111,13 +113,30 @@ impl Report<'_> {
             outliers: base.noise_at(|part| matches!(part, Part::Effect { .. })),
             quick: settings.quick,
             interrupted: self.found.is_partial,
-            integrator: base.step.map(|step| step.integrator),
-            substeps: base.step.map(|step| step.substeps),
+            integrator: self.finer().map(|step| step.integrator),
+            substeps: self.finer().map(|step| step.stepping.substeps),
+            hold: self.other_hold(),
             candidates: known.listed().len() + known.unknown().len(),
             not_tested: not_tested(self.study, &self.found.evidence.listed),
             passes: base.model.problem.passes().so_far(),
             seconds: 0.0,
         })
+    }
+
+    /// The finer step that was used in place of the twin's own.
+    fn finer(&self) -> Option<OtherStep> {
+        let (integrator, own) = self.study.twin().integration()?;
+        let is_own = |step: &OtherStep| {
+            (step.integrator, step.stepping.substeps) == (integrator, own.substeps)
+        };
+        self.found.evidence.base.step.filter(|step| !is_own(step))
+    }
+
+    /// The rule for inputs between samples that was used in place of the twin's own.
+    fn other_hold(&self) -> Option<Hold> {
+        let (_, own) = self.study.twin().integration()?;
+        let used = self.found.evidence.base.step?.stepping.hold;
+        (used != own.hold).then_some(used)
     }
 
     /// Lists what makes the diagnosis doubtful.
@@ -130,10 +149,11 @@ impl Report<'_> {
             records,
             self.validation.map(|records| &records[0]),
             parameters,
-            self.found.evidence.base.step.is_some(),
+            self.finer().is_some(),
             self.found.evidence.searched(),
         );
         all.extend(elsewhere.map(|start| Warning::elsewhere(&start, records.len())));
+        all.extend(self.other_hold().map(|hold| Warning::hold(hold, None)));
         all
     }
 

@@ -1,26 +1,29 @@
-//! The step of a twin's own integrator as a rival of every gap: what a finer step explains, the system does not lack.
+//! The step of a twin's own integrator, and its inputs between samples, as rivals of every gap: what a finer step or another rule for inputs
+//! explains, the system does not lack.
 
 use super::thresholds::Thresholds;
+use crate::fit::other_hold;
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::hypothesis::search::model::Model;
 use crate::likelihood::kalman::recoverable;
 use crate::study::StudyError;
-use crate::twin::{Integrator, MOST_SUBSTEPS, Twin};
+use crate::twin::{Integrator, MOST_SUBSTEPS, Stepping, Twin};
 use nalgebra::DVector;
 
-/// A finer step than a twin's own.
+/// A finer step than a twin's own, or another rule for inputs between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::diagnose) struct FinerStep {
+pub(in crate::diagnose) struct OtherStep {
     pub integrator: Integrator,
-    pub substeps: usize,
+    pub stepping: Stepping,
 }
 
-impl FinerStep {
+impl OtherStep {
     /// Finer steps from the cheapest to the last, which stands for an exact one. A Runge–Kutta step takes four rates, and is given the time
     /// of four of Euler's; limits of states act once a substep, so that only more of them help a state that runs into its limits.
-    fn candidates(integrator: Integrator, own: usize) -> Vec<Self> {
+    fn candidates(integrator: Integrator, stepping: Stepping) -> Vec<Self> {
         use Integrator::{Euler, RungeKutta4};
+        let own = stepping.substeps;
         let all = match integrator {
             Euler => vec![
                 (RungeKutta4, own.div_ceil(4)),
@@ -33,7 +36,10 @@ impl FinerStep {
         (all.into_iter())
             .map(|(integrator, substeps)| Self {
                 integrator,
-                substeps: substeps.min(MOST_SUBSTEPS),
+                stepping: Stepping {
+                    substeps: substeps.min(MOST_SUBSTEPS),
+                    ..stepping
+                },
             })
             .collect()
     }
@@ -41,8 +47,7 @@ impl FinerStep {
     /// The twin with this step; `None` for a black box.
     pub fn of(self, twin: &Twin) -> Option<Twin> {
         twin.stepped(|integrator, stepping| {
-            *integrator = self.integrator;
-            stepping.substeps = self.substeps;
+            (*integrator, *stepping) = (self.integrator, self.stepping);
         })
     }
 }
@@ -50,25 +55,53 @@ impl FinerStep {
 /// The cheapest finer step from which an exact one cannot be told, where it explains a model's records better than its twin's own, and how
 /// much better, in nats; `None` where the step does not show, or shows for the better, and for a black box.
 ///
+/// First it is asked, where the study leaves it open, whether another rule for inputs between samples explains the records better; that is
+/// then a part of the step.
+///
 /// A step shows from `least` nats on. Which finer one, the innovations say, not evidence: an error of a coarser one may imitate what is
 /// missing. Beside a model that explains so many nats, an error below a law's fine print is none.
-pub(in crate::diagnose) fn finer_step(
+pub(in crate::diagnose) fn other_step(
     model: &Model,
-    least: f64,
-    explained: f64,
-) -> Result<Option<(FinerStep, f64)>, StudyError> {
+    (least, explained): (f64, f64),
+    asks_hold: bool,
+) -> Result<Option<(OtherStep, f64)>, StudyError> {
     let Some((integrator, stepping)) = model.base.integration() else {
         return Ok(None);
     };
+    if asks_hold && let Some(other) = other_hold(&model.problem, &model.fitted)? {
+        let stepping = Stepping {
+            hold: other.hold,
+            ..stepping
+        };
+        let held = OtherStep {
+            integrator,
+            stepping,
+        };
+        let (base, problem) = (held.of(&model.base), model.problem.held(other.hold));
+        let (Some(base), Some(problem)) = (base, problem) else {
+            return Ok(None);
+        };
+        let held_model = Model {
+            base,
+            problem,
+            ..model.clone()
+        };
+        let finer = held_model.carried_on()?.unwrap_or(held_model);
+        let finer = other_step(&finer, (least, explained), false)?;
+        return Ok(Some(match finer {
+            Some((step, more)) => (step, other.gain + more),
+            None => (held, other.gain),
+        }));
+    }
     let theta = &model.fitted.theta;
     let Some(reference) = recoverable(Reference::new(&model.problem, theta))?.flatten() else {
         return Ok(None);
     };
-    let problem = |step: FinerStep| -> Result<Option<Problem>, StudyError> {
+    let problem = |step: OtherStep| -> Result<Option<Problem>, StudyError> {
         let twin = step.of(&model.base);
         Ok(twin.map(|twin| model.problem_of(&twin)).transpose()?)
     };
-    let direction = |step: FinerStep| -> Result<Option<DVector<f64>>, StudyError> {
+    let direction = |step: OtherStep| -> Result<Option<DVector<f64>>, StudyError> {
         let Some(problem) = problem(step)? else {
             return Ok(None);
         };
@@ -77,7 +110,7 @@ pub(in crate::diagnose) fn finer_step(
     };
     let nats = |direction: &DVector<f64>| 0.5 * reference.own(direction);
     let near = Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * explained);
-    let candidates = FinerStep::candidates(integrator, stepping.substeps);
+    let candidates = OtherStep::candidates(integrator, stepping);
     let Some((&last, cheaper)) = candidates.split_last() else {
         return Ok(None);
     };
@@ -111,7 +144,7 @@ pub(in crate::diagnose) fn finer_step(
     // With less noise than the own step needs, an error of the finer one may show as well.
     let twin = chosen.of(&model.base);
     let further = match twin {
-        Some(base) => finer_step(&Model { base, ..carried }, least, explained)?,
+        Some(base) => other_step(&Model { base, ..carried }, (least, explained), false)?,
         None => None,
     };
     Ok(Some(match further {
@@ -146,7 +179,7 @@ mod tests {
             let passes = Passes::default();
             let base = Base::new(&study, study.twin(), records.into(), &settings, &passes);
             let base = base.unwrap();
-            finer_step(&base.model, Thresholds::STEP_SHOWS, 0.0).unwrap()
+            other_step(&base.model, (Thresholds::STEP_SHOWS, 0.0), true).unwrap()
         };
         for seed in 0..3 {
             assert!(

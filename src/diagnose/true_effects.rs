@@ -4,7 +4,7 @@ use super::base::{Base, finished};
 use super::outcome::Shrinkage;
 use super::quantify::share::{Measures, shrinkage};
 use super::settings::DiagnoseSettings;
-use super::step::finer_step;
+use super::step::other_step;
 use super::thresholds::Thresholds;
 use crate::fit::Passes;
 use crate::hypothesis::search::model::Model;
@@ -45,7 +45,7 @@ pub(crate) fn true_fit(
     let Some(mut found) = fit(study.twin(), settings)? else {
         return Ok(None);
     };
-    if let Some((step, _)) = finer_step(&found.1, Thresholds::STEP_SHOWS, 0.0)?
+    if let Some((step, _)) = other_step(&found.1, (Thresholds::STEP_SHOWS, 0.0), study.asks_hold())?
         && let Some(finer) = step.of(study.twin())
     {
         let begin = DiagnoseSettings {

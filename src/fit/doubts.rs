@@ -7,8 +7,8 @@ use crate::likelihood::StartElsewhere;
 use crate::math::{is_constant, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
 use crate::setting::number;
-use crate::twin::Twin;
 use crate::twin::conformance::coarse_step;
+use crate::twin::{Hold, Twin};
 use std::collections::BTreeMap;
 
 /// Code of a free run that diverges.
@@ -17,7 +17,7 @@ pub(crate) const DIVERGES: &str = "free-run-diverges";
 pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 18] = [
+const REMEDIES: [(&str, &str); 19] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",
@@ -47,6 +47,10 @@ const REMEDIES: [(&str, &str); 18] = [
         "narrow the bounds, judge by one-step errors, or diagnose what the twin lacks",
     ),
     ("gate-near-level", "take neither answer of the test as sure"),
+    (
+        "inputs-between-samples",
+        "declare in the study how inputs move between samples, if you know it",
+    ),
     (
         "leans-on-prior",
         "do not trust the prior, or refine always, for what the record says alone",
@@ -112,6 +116,23 @@ impl Warning {
             "step-matters",
             format!("the step{of} is {coarse}"),
         ))
+    }
+
+    /// A rule for inputs between samples that is not the study's.
+    pub(crate) fn hold(hold: Hold, gain: Option<f64>) -> Self {
+        let rule = match hold {
+            Hold::Zero => "are held at the last sample",
+            Hold::Linear => "move on a line (hold = \"linear\")",
+            Hold::Nearest => "are held at the nearest sample (hold = \"nearest\")",
+        };
+        let gain = gain.map_or(String::new(), |gain| {
+            format!(
+                ", which explains the records better by {} nats",
+                number(three_digits(gain))
+            )
+        });
+        let what = format!("between samples, inputs {rule}{gain}; this is used");
+        Self::new("inputs-between-samples", what)
     }
 
     /// A start that is not that of a record, of so many.

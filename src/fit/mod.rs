@@ -13,6 +13,7 @@
 //! | `climb.rs`, `kinks.rs` | the most probable θ, also where the likelihood has kinks |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `evidence.rs` | the likelihood averaged over the prior |
+//! | `hold.rs` | the rule for inputs between samples that the records ask for |
 //! | `reference.rs` | linear gain of a direction beside θ |
 //! | `doubts.rs` | reasons to doubt a result, in one list |
 //! | `posterior/` | draws of θ given the records, as a table, as errors and intervals, as a region |
@@ -26,6 +27,7 @@ pub(crate) mod doubts;
 pub(crate) mod evidence;
 pub(crate) mod follow;
 pub(crate) mod growing;
+mod hold;
 mod kinks;
 pub(crate) mod least_squares;
 mod outcome;
@@ -41,6 +43,7 @@ pub(crate) mod starts;
 
 pub(crate) use budget::{ITERATIONS, Passes};
 pub use certificate::Side;
+pub(crate) use hold::other_hold;
 pub(crate) use outcome::NOT_CONVERGED;
 pub use outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue, Nuisance,

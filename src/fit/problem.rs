@@ -5,7 +5,7 @@ use crate::fit::budget::Passes;
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, States};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
-use crate::twin::{Noise, Outline, Parameter, ParameterSpace, Role, Twin};
+use crate::twin::{Hold, Noise, Outline, Parameter, ParameterSpace, Role, Twin};
 use std::sync::Arc;
 
 /// Longest step of a fit in the logarithm of a black box's noise level.
@@ -140,6 +140,16 @@ impl Problem {
     /// True where each likelihood costs an ensemble of simulations.
     pub fn is_simulated(&self) -> bool {
         self.likelihood.is_simulated()
+    }
+
+    /// The same with another rule for inputs between samples; `None` for a black box.
+    pub fn held(&self, hold: Hold) -> Option<Self> {
+        let twin = self.twin.stepped(|_, stepping| stepping.hold = hold)?;
+        let axes = self.axes[..twin.parameters().len()].to_vec();
+        Some(Self {
+            families: self.families.clone(),
+            ..self.with_twin(twin, axes)
+        })
     }
 
     /// The same twin on other records.

@@ -2,13 +2,13 @@
 
 use super::{Study, StudyError};
 use crate::effect::Effect;
-use crate::fit::{Fit, FitScore, FitSettings, Subject, run, score};
+use crate::fit::{Fit, FitScore, FitSettings, Subject, Warning, other_hold, run, score};
 use crate::hypothesis::search::effects::searched;
 use crate::likelihood::{Beliefs, measured};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
-use crate::twin::{NoiseLevel, StartLevel};
+use crate::twin::{Hold, NoiseLevel, StartLevel, Twin};
 use std::time::Instant;
 
 impl Study {
@@ -64,9 +64,22 @@ impl Study {
         let study = self.for_records(records)?;
         let effects = study.added_effects()?;
         let stage = progress.stage("fit", 1);
-        let measured = measured(&study.twin, records, &study.beliefs())?;
-        let searched = searched(&measured, &effects, records.into(), settings.noise())?;
+        let fitted = |twin: &Twin| -> Result<_, StudyError> {
+            let measured = measured(twin, records, &study.beliefs())?;
+            let searched = searched(&measured, &effects, records.into(), settings.noise())?;
+            Ok((measured, searched))
+        };
+        let (mut measured, mut searched) = fitted(&study.twin)?;
+        let other = match searched.fits.first() {
+            Some(best) if study.asks_hold() => other_hold(&searched.problem, best)?,
+            _ => None,
+        };
+        if let Some(twin) = other.and_then(|other| study.held(other.hold)) {
+            (measured, searched) = fitted(&twin)?;
+        }
         let mut fit = run(&measured, searched, settings)?.ok_or(StudyError::NoFit)?;
+        fit.hold = other.map(|other| other.hold);
+        (fit.warnings).extend(other.map(|other| Warning::hold(other.hold, Some(other.gain))));
         fit.seconds = clock.elapsed().as_secs_f64();
         stage.tick()?;
         Ok(fit)
@@ -80,11 +93,22 @@ impl Study {
     pub fn score(&self, fit: &Fit, record: &Record) -> Result<FitScore, StudyError> {
         self.check_channels(record)?;
         let study = self.for_records(std::slice::from_ref(record))?;
+        let held = fit.hold.and_then(|hold| study.held(hold));
         let subject = Subject {
-            twin: &study.twin,
+            twin: held.as_ref().unwrap_or(&study.twin),
             beliefs: &study.beliefs(),
         };
         score(&subject, fit, record)?.ok_or(StudyError::NoFit)
+    }
+
+    /// Returns whether the records say how inputs move between samples: the study's file does not.
+    pub(crate) fn asks_hold(&self) -> bool {
+        self.file.record.hold.is_none()
+    }
+
+    /// The twin with another rule for inputs between samples; `None` for a black box.
+    fn held(&self, hold: Hold) -> Option<Twin> {
+        self.twin.stepped(|_, stepping| stepping.hold = hold)
     }
 
     /// Effects that the study's file adds to the twin.

@@ -14,7 +14,7 @@ pub(in crate::diagnose) use warnings::warnings;
 
 use crate::fit::{Nuisance, Warning};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{Integrator, Interval};
+use crate::twin::{Hold, Integrator, Interval};
 use serde::ser::{SerializeStruct, Serializer};
 use serde::{Deserialize, Serialize};
 
@@ -305,6 +305,8 @@ pub struct Diagnosis {
     pub integrator: Option<Integrator>,
     /// Its substeps of a sample.
     pub substeps: Option<usize>,
+    /// Rule for inputs between samples that the diagnosis used in place of the twin's, as the records ask for.
+    pub hold: Option<Hold>,
     /// Smallest visible magnitude of each listed effect.
     pub power: Vec<Visible>,
     /// Number of explanations tested: listed effects and unknown functions.

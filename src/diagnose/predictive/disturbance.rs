@@ -61,7 +61,7 @@ impl Predictive<'_> {
         let places = places(problem);
         let fitted = &self.model.fitted.theta;
         let measured = courses(problem, fitted, &problem.records, &places)?;
-        let reference = self.reference().unwrap_or_else(|| fitted.clone());
+        let (reference, _) = self.reference();
         let replicates = self.replicates(0..Thresholds::CHECK_FIRST, |_| &reference)?;
         let simulated: Vec<Vec<Course>> = (replicates.par_iter())
             .map(|Replicate { records, .. }| courses(problem, fitted, records, &places))

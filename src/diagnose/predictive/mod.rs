@@ -57,7 +57,7 @@ impl Predictive<'_> {
         if problem.is_simulated() || self.draws.thetas.is_empty() {
             return Ok(None);
         }
-        let statistics = Statistic::all(problem);
+        let statistics = Statistic::all(problem, self.correlated().is_empty());
         let measured = self.measured(&statistics)?;
         let mut simulated: Vec<Look> = vec![];
         let mut compared = None;

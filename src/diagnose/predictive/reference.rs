@@ -29,13 +29,10 @@ pub(in crate::diagnose) fn declared(twin: &Twin, problem: &Problem) -> Vec<Strin
 }
 
 impl Predictive<'_> {
-    /// The fitted θ with declared levels where they are declared, and without correlated noise; `None` where that is the fitted θ in kind: no
-    /// level beyond its declaration, no correlated noise.
-    pub(super) fn reference(&self) -> Option<Vec<f64>> {
+    /// The fitted full θ with declared levels where they are declared, and without correlated noise; and whether noise is of another kind than
+    /// that: a level is beyond its declaration, or there is correlated noise.
+    pub(super) fn reference(&self) -> (Vec<f64>, bool) {
         let problem = &self.model.problem;
-        let Twin::Equations(twin) = &problem.twin else {
-            return None;
-        };
         let mut theta = self.model.theta();
         let mut is_other = false;
         for (j, p) in problem.twin.parameters().iter().enumerate() {
@@ -47,12 +44,19 @@ impl Predictive<'_> {
                 theta[j] = axis.centre;
             }
         }
-        for (.., size) in twin.disturbances() {
-            let least = problem.axes[size].bounds.low();
-            is_other |= theta[size] > least;
-            theta[size] = least;
+        for size in self.correlated() {
+            theta[size] = problem.axes[size].bounds.low();
+            is_other = true;
         }
-        is_other.then(|| problem.full(&theta))
+        (problem.full(&theta), is_other)
+    }
+
+    /// Entries of the sizes of correlated noise.
+    pub(super) fn correlated(&self) -> Vec<usize> {
+        match &self.model.problem.twin {
+            Twin::Equations(twin) => twin.disturbances().iter().map(|(.., size)| *size).collect(),
+            Twin::BlackBox(_) => vec![],
+        }
     }
 
     /// Share of the output's variance that noise beyond the reference puts into predictions as far ahead as windows of the record reach.
@@ -61,9 +65,10 @@ impl Predictive<'_> {
         statistics: &[Statistic],
         simulated: &[Look],
     ) -> Result<Option<f64>, StudyError> {
-        let Some(theta) = self.reference() else {
+        let (theta, is_other) = self.reference();
+        if !is_other {
             return Ok(None);
-        };
+        }
         let Some(at) = statistics.iter().rposition(Statistic::is_window) else {
             return Ok(None);
         };

@@ -20,7 +20,11 @@ use crate::study::StudyError;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Statistic {
     Spread(String),
-    Whiteness(String),
+    /// It counts where the fit claims that all noise is white: of correlated noise a fit knows a few correlations alone.
+    Whiteness {
+        output: String,
+        counts: bool,
+    },
     Tails(String),
     Bursts(String),
     Error(Reach, f64),
@@ -31,14 +35,17 @@ pub(super) type Look = Vec<f64>;
 
 impl Statistic {
     /// All that are looked at.
-    pub fn all(problem: &Problem) -> Vec<Self> {
+    pub fn all(problem: &Problem, is_white: bool) -> Vec<Self> {
         let outputs = problem.outline().outputs.into_iter();
         let mut all: Vec<Self> = outputs
             .flat_map(|output| {
                 let name = output.name;
                 [
                     Self::Spread(name.clone()),
-                    Self::Whiteness(name.clone()),
+                    Self::Whiteness {
+                        output: name.clone(),
+                        counts: is_white,
+                    },
                     Self::Tails(name.clone()),
                     Self::Bursts(name),
                 ]
@@ -58,7 +65,8 @@ impl Statistic {
     pub fn departure(&self, deviations: f64) -> f64 {
         match self {
             Self::Spread(_) | Self::Error(..) => deviations.abs(),
-            Self::Whiteness(_) | Self::Tails(_) | Self::Bursts(_) => deviations.max(0.0),
+            Self::Whiteness { counts: false, .. } => 0.0,
+            Self::Whiteness { .. } | Self::Tails(_) | Self::Bursts(_) => deviations.max(0.0),
         }
     }
 
@@ -71,7 +79,7 @@ impl Statistic {
     pub fn id(&self) -> String {
         match self {
             Self::Spread(output) => format!("spread of {output}"),
-            Self::Whiteness(output) => format!("whiteness of {output}"),
+            Self::Whiteness { output, .. } => format!("whiteness of {output}"),
             Self::Tails(output) => format!("tails of {output}"),
             Self::Bursts(output) => format!("bursts of {output}"),
             Self::Error(Reach::FreeRun, _) => "error of the free run".into(),
@@ -146,7 +154,7 @@ pub(super) fn look(
     let value = |statistic: &Statistic| -> Result<f64, StudyError> {
         Ok(match statistic {
             Statistic::Spread(output) => mean_power(&series(output), 2).ln(),
-            Statistic::Whiteness(output) => correlation(&series(output)).ln(),
+            Statistic::Whiteness { output, .. } => correlation(&series(output)).ln(),
             Statistic::Tails(output) => {
                 let series = series(output);
                 (mean_power(&series, 4) / mean_power(&series, 2).powi(2)).ln()

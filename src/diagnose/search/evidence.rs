@@ -1,7 +1,7 @@
 //! Interface between a search and the records: questions, changes of the twin, answers.
 
 use super::explanations::Explanations;
-use crate::diagnose::step::FinerStep;
+use crate::diagnose::step::OtherStep;
 use crate::diagnose::thresholds::Thresholds;
 use crate::hypothesis::search::Breadth;
 use crate::hypothesis::search::explanation::Explanation;
@@ -97,7 +97,7 @@ pub(in crate::diagnose) enum Change {
     OwnStep,
     /// A finer step.
     Step {
-        step: FinerStep,
+        step: OtherStep,
         /// True where it matters little beside what was found: explanations are carried on.
         is_minor: bool,
     },
@@ -151,7 +151,7 @@ pub(in crate::diagnose) trait Evidence: Sized + Sync {
         &self,
         beside: &Explanation,
         known: &Explanations,
-    ) -> Result<Option<(FinerStep, f64)>, StudyError>;
+    ) -> Result<Option<(OtherStep, f64)>, StudyError>;
 
     /// Effort with which the search begins.
     fn breadth(&self) -> Breadth;

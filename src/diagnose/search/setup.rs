@@ -7,7 +7,7 @@ use crate::diagnose::base::Base;
 use crate::diagnose::candidates;
 use crate::diagnose::prior::inside;
 use crate::diagnose::settings::{Ablation, DiagnoseSettings};
-use crate::diagnose::step::{FinerStep, finer_step};
+use crate::diagnose::step::{OtherStep, other_step};
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::Passes;
 use crate::hypothesis::noise::kinds;
@@ -123,9 +123,10 @@ impl<'s> Task<'s> {
 
     /// The finer step that the records ask for beside the twin alone. A gap may pass for one: an effect that is more probable, as one of all
     /// that are listed, is asked first.
-    fn step_at_once(&self, base: &Base) -> Result<Option<FinerStep>, StudyError> {
+    fn step_at_once(&self, base: &Base) -> Result<Option<OtherStep>, StudyError> {
         let (model, least) = (&base.model, Thresholds::STEP_SHOWS);
-        let Some((step, gain)) = finer_step(model, least, 0.0)? else {
+        let asks_hold = self.study.asks_hold();
+        let Some((step, gain)) = other_step(model, (least, 0.0), asks_hold)? else {
             return Ok(None);
         };
         let terms = base.listed(self.study, self.settings)?;
@@ -137,7 +138,7 @@ impl<'s> Task<'s> {
         let price = (effects.len() as f64 / Thresholds::LISTED).ln();
         let best = (effects.first()).filter(|e| e.log_z - model.log_evidence - price > gain);
         match best.and_then(|effect| effect.model.as_ref()) {
-            Some(beside) => Ok(finer_step(beside, least, 0.0)?.map(|(step, _)| step)),
+            Some(beside) => Ok(other_step(beside, (least, 0.0), asks_hold)?.map(|(step, _)| step)),
             None => Ok(Some(step)),
         }
     }
@@ -146,7 +147,7 @@ impl<'s> Task<'s> {
     fn with_step(
         &self,
         base: &Base,
-        step: FinerStep,
+        step: OtherStep,
         thetas: &[Vec<f64>],
     ) -> Result<Setup<'s>, StudyError> {
         let own = self.study.twin();
@@ -228,7 +229,7 @@ impl<'s> Setup<'s> {
     }
 
     /// Returns whether the twin or one of the best explanations, each carried on with a finer step, is likelier than all are with their own.
-    fn helps(&self, step: FinerStep, known: &Explanations) -> Result<bool, StudyError> {
+    fn helps(&self, step: OtherStep, known: &Explanations) -> Result<bool, StudyError> {
         let Some(twin) = step.of(&self.base.model.base) else {
             return Ok(false);
         };
@@ -330,7 +331,7 @@ impl Evidence for Setup<'_> {
         &self,
         beside: &Explanation,
         known: &Explanations,
-    ) -> Result<Option<(FinerStep, f64)>, StudyError> {
+    ) -> Result<Option<(OtherStep, f64)>, StudyError> {
         let Some(model) = &beside.model else {
             return Ok(None);
         };
@@ -340,7 +341,8 @@ impl Evidence for Setup<'_> {
             true => Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * top),
             false => Thresholds::STEP_SHOWS,
         };
-        let finer = finer_step(model, least, top)?;
+        let asks_hold = self.task.study.asks_hold();
+        let finer = other_step(model, (least, top), asks_hold)?;
         let finer = finer.filter(|(step, _)| self.base.step != Some(*step));
         match finer {
             Some((step, _)) if is_twin && !self.helps(step, known)? => Ok(None),

@@ -2,13 +2,13 @@
 
 use super::evidence::{Family, Question};
 use super::*;
-use crate::diagnose::step::FinerStep;
+use crate::diagnose::step::OtherStep;
 use crate::effect::Catalogue;
 use crate::hypothesis::search::Breadth;
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::term::{Nature, Part, Term, fixture};
 use crate::progress::Listener;
-use crate::twin::Integrator;
+use crate::twin::{Hold, Integrator, Stepping};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -28,7 +28,7 @@ struct Table {
     /// The table with another kind of noise, with a finer step, or with the twin's own instead of a finer one.
     changed: Option<Box<Table>>,
     /// The finer step that is asked for.
-    step: Option<FinerStep>,
+    step: Option<OtherStep>,
     /// `true` where the search begins with a finer step.
     is_finer: bool,
     asked: Arc<Mutex<Vec<Asked>>>,
@@ -171,7 +171,7 @@ impl Evidence for Table {
         &self,
         _: &Explanation,
         _: &Explanations,
-    ) -> Result<Option<(FinerStep, f64)>, StudyError> {
+    ) -> Result<Option<(OtherStep, f64)>, StudyError> {
         Ok(self.step.map(|step| (step, 5.0)))
     }
 
@@ -200,9 +200,12 @@ impl Evidence for Table {
     }
 }
 
-const FINER: FinerStep = FinerStep {
+const FINER: OtherStep = OtherStep {
     integrator: Integrator::RungeKutta4,
-    substeps: 4,
+    stepping: Stepping {
+        substeps: 4,
+        hold: Hold::Zero,
+    },
 };
 
 #[test]

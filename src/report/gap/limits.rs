@@ -2,7 +2,7 @@
 
 use super::cause::calibration;
 use super::check::{outcome, table};
-use super::statement::finer_step;
+use super::statement::{capitalised, other_step};
 use super::words::few;
 use crate::diagnose::{Diagnosis, Maps, Visible};
 use crate::effect::EffectKey;
@@ -13,10 +13,9 @@ use crate::report::units::Units;
 
 pub(super) fn section(units: &Units, diagnosis: &Diagnosis) -> Section {
     let mut brief = vec![];
-    brief.extend(finer_step(diagnosis).map(|step| {
-        Block::Paragraph(format!(
-            "The twin's own step is too long for this record; the diagnosis used {step}."
-        ))
+    brief.extend(other_step(diagnosis).map(|[step, wrong]| {
+        let text = format!("{wrong}; the diagnosis used {step}.");
+        Block::Paragraph(capitalised(&text))
     }));
     brief.extend(match (diagnosis.interrupted, diagnosis.quick) {
         (true, _) => Some(

@@ -7,7 +7,7 @@ use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, Verdict};
 use crate::report::NEXT_INPUT;
 use crate::report::digits::{chance, percent, short, with_unit};
 use crate::report::units::Units;
-use crate::twin::Integrator;
+use crate::twin::{Hold, Integrator};
 
 /// Characters of a headline: two lines of a page.
 const LONGEST: usize = 140;
@@ -377,7 +377,7 @@ pub(super) fn sentence(units: &Units, fit: &EffectFit) -> Option<String> {
     })
 }
 
-fn capitalised(text: &str) -> String {
+pub(super) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters
         .next()
@@ -385,17 +385,28 @@ fn capitalised(text: &str) -> String {
     first + letters.as_str()
 }
 
-/// The finer step that the diagnosis used, as a user would set it; none where it used the twin's own.
-pub(super) fn finer_step(diagnosis: &Diagnosis) -> Option<String> {
-    let (integrator, substeps) = (diagnosis.integrator?, diagnosis.substeps?);
-    let mut settings = vec![];
-    if integrator == Integrator::RungeKutta4 {
-        settings.push("integrator runge-kutta-4".to_owned());
+/// The finer step and the rule for inputs that the diagnosis used, as a user would set them, and what is wrong with the twin's own; none where
+/// it used these.
+pub(super) fn other_step(diagnosis: &Diagnosis) -> Option<[String; 2]> {
+    let (mut settings, mut wrong) = (vec![], vec![]);
+    if let (Some(integrator), Some(substeps)) = (diagnosis.integrator, diagnosis.substeps) {
+        if integrator == Integrator::RungeKutta4 {
+            settings.push("integrator runge-kutta-4".to_owned());
+        }
+        if substeps > 1 || settings.is_empty() {
+            settings.push(format!("{substeps} substeps"));
+        }
+        wrong.push("the twin's own step is too long for this record");
     }
-    if substeps > 1 || settings.is_empty() {
-        settings.push(format!("{substeps} substeps"));
+    if let Some(hold) = diagnosis.hold {
+        settings.push(match hold {
+            Hold::Zero => "hold \"zero\"".to_owned(),
+            Hold::Linear => "hold \"linear\"".to_owned(),
+            Hold::Nearest => "hold \"nearest\"".to_owned(),
+        });
+        wrong.push("its inputs move otherwise between samples");
     }
-    Some(settings.join(" with "))
+    (!settings.is_empty()).then(|| [settings.join(" with "), wrong.join(", and ")])
 }
 
 /// Advice on what to do.
@@ -408,10 +419,10 @@ pub(super) fn next(diagnosis: &Diagnosis) -> String {
     };
     let advice = match (diagnosis.verdict, cause.decision) {
         _ if diagnosis.interrupted => "run the diagnosis again, to its end".into(),
-        (Verdict::NoGap | Verdict::ParameterGap, _) if finer_step(diagnosis).is_some() => format!(
-            "give the study {}; the twin's own step is too long",
-            finer_step(diagnosis).unwrap_or_default()
-        ),
+        (Verdict::NoGap | Verdict::ParameterGap, _) if other_step(diagnosis).is_some() => {
+            let [step, wrong] = other_step(diagnosis).unwrap_or_default();
+            format!("give the study {step}; {wrong}")
+        }
         (Verdict::NoGap, _) if cause.probabilities.nothing < CLEAR => {
             "a longer record, or another one, decides".into()
         }

@@ -1,0 +1,125 @@
+//! Inputs between samples, asked of the records.
+
+use super::climb::{Fitted, climb};
+use super::problem::Problem;
+use super::reference::Reference;
+use crate::fit::budget::ITERATIONS;
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::twin::Hold;
+
+/// Nats by which a rule must move the innovations, θ free to answer, to be fitted at all: less is hardly 2 nats of a gain.
+const SHOWS: f64 = 1.0;
+/// Nats from which another rule becomes that of the twin: 20 to 1, as the user is then asked to change the study. Twice asks two records in a
+/// hundred fewer whose inputs are sampled; half takes noise for a rule in one of twenty.
+const WINS: f64 = 3.0;
+
+/// Another rule for inputs between samples, with which a fit explains its records better.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct OtherHold {
+    pub hold: Hold,
+    /// Nats of posterior density that it gains.
+    pub gain: f64,
+}
+
+/// The rule for inputs between samples that explains the records of a fit best, if it is another than that of the twin; `None` where the own
+/// one does, and for a black box.
+pub(crate) fn other_hold(
+    problem: &Problem,
+    fitted: &Fitted,
+) -> Result<Option<OtherHold>, FilterError> {
+    let Some((_, stepping)) = problem.twin.integration() else {
+        return Ok(None);
+    };
+    let moves = problem.records.iter().any(|record| {
+        let inputs = record.drive().inputs();
+        inputs.rows().into_iter().any(|row| row != inputs.row(0))
+    });
+    if !moves {
+        return Ok(None);
+    }
+    let theta = &fitted.theta;
+    let Some(reference) = recoverable(Reference::new(problem, theta))?.flatten() else {
+        return Ok(None);
+    };
+    let own = climb(problem, theta, ITERATIONS)?.map_or(fitted.objective, |own| own.objective);
+    let mut best: Option<OtherHold> = None;
+    for hold in [Hold::Zero, Hold::Linear, Hold::Nearest] {
+        let Some(other) = problem.held(hold).filter(|_| hold != stepping.hold) else {
+            continue;
+        };
+        let filtered = recoverable(other.filtered(theta))?;
+        let shows = |f| 0.5 * reference.own(&reference.direction(f)) > SHOWS;
+        if !filtered.as_ref().is_some_and(|filtered| shows(filtered)) {
+            continue;
+        }
+        let Some(carried) = climb(&other, theta, ITERATIONS)? else {
+            continue;
+        };
+        let gain = carried.objective - own;
+        if gain > best.map_or(WINS, |best| best.gain) {
+            best = Some(OtherHold { hold, gain });
+        }
+    }
+    Ok(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Drive, Record, Signal};
+    use crate::study::Study;
+    use crate::twin::{
+        DigitalTwin, Integrator, Noise, Now, Outline, Parameter, StateSpace, Stepping, Twin,
+    };
+
+    /// A room that is heated: τ·ẋ = K·u − x.
+    #[derive(Clone)]
+    struct Room;
+
+    impl StateSpace for Room {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("K", "K/W", 0.5, 4.0))
+                .parameter(Parameter::new("tau", "s", 1.0, 8.0))
+                .state("x", "K")
+                .input("u", "W")
+                .output("y", "K")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = (now.theta[0] * now.u[0] - x[0]) / now.theta[1];
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
+            measurement[0] = 0.02;
+        }
+        fn integrator(&self) -> Integrator {
+            Integrator::RungeKutta4
+        }
+    }
+
+    /// The rule that a fit asks for of a record that was made with another.
+    fn asked(made_with: Hold, u: impl Fn(f64) -> f64, seed: u64) -> Option<Hold> {
+        let inputs = Signal::from_shape_fn((150, 1), |(k, _)| u(2.0 * k as f64));
+        let drive = Drive::new(2.0, inputs).unwrap();
+        let stepping = Stepping {
+            substeps: 16,
+            hold: made_with,
+        };
+        let world = (Twin::new(Room).stepped(|_, own| *own = stepping)).unwrap();
+        let outputs = world.simulate(&[2.0, 3.0], &drive, Noise::new(seed, "held", 0));
+        let record = Record::new(drive, outputs.unwrap()).unwrap();
+        Study::of(Room).unwrap().fit(&[record]).unwrap().hold
+    }
+
+    #[test]
+    fn records_say_how_their_inputs_move() {
+        let smooth = |t: f64| 1.0 + (0.7 * t).sin();
+        for seed in 0..3 {
+            assert_eq!(asked(Hold::Linear, smooth, seed), Some(Hold::Linear));
+            assert_eq!(asked(Hold::Zero, smooth, seed), None);
+            assert_eq!(asked(Hold::Linear, |_| 1.0, seed), None);
+        }
+    }
+}
