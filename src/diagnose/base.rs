@@ -1,6 +1,7 @@
 //! The twin as it is, fitted: where a diagnosis begins.
 
 use super::candidates;
+use super::feedback::reacting;
 use super::settings::{Ablation, DiagnoseSettings};
 use super::step::OtherStep;
 use super::thresholds::Thresholds;
@@ -16,6 +17,7 @@ use crate::hypothesis::search::frequencies::frequencies;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::shared;
 use crate::hypothesis::term::{Part, Term};
+use crate::likelihood::kalman::recoverable;
 use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
@@ -28,6 +30,8 @@ pub(in crate::diagnose) struct Base {
     pub theta: Vec<f64>,
     pub scales: Scales,
     pub frequencies: Vec<f64>,
+    /// Inputs that react to an output of the same row.
+    pub reacting: Vec<String>,
     /// Places whose noise level is fitted.
     pub noisy: Vec<String>,
     /// `true` for a black box without noise of its own.
@@ -182,7 +186,13 @@ impl Base {
     fn of(model: Model) -> Result<Self, StudyError> {
         let (theta, outline) = (model.theta(), model.problem.outline());
         let records = model.problem.records.clone();
+        let inputs: Vec<String> = outline.inputs.iter().map(|u| u.name.clone()).collect();
+        let filtered = match inputs.is_empty() {
+            true => None,
+            false => recoverable(model.problem.filtered(&model.fitted.theta))?,
+        };
         Ok(Self {
+            reacting: filtered.map_or(vec![], |all| reacting(&all, &records, &inputs)),
             scales: Scales::new(&model.base, &theta, records, model.states()?, outline),
             frequencies: frequencies(&model)?,
             noisy: vec![],

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `run.rs`, `report.rs` | entry; everything that is reported of a search |
 //! | `base.rs`, `prior.rs` | the fitted twin that a search begins with; the same within its prior |
+//! | `feedback.rs` | inputs that a controller makes of the outputs |
 //! | `greedy.rs` | a baseline: forward selection by BIC |
 //! | `true_effects.rs` | the share that effects close which are known to be there |
 //! | `step.rs` | whether a finer step of the integrator explains the records better |
@@ -22,6 +23,7 @@
 pub(crate) mod answer;
 mod base;
 mod candidates;
+mod feedback;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod greedy;

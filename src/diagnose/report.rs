@@ -30,7 +30,7 @@ use crate::likelihood::start_elsewhere;
 use crate::progress::{Progress, Stage};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
-use crate::twin::Hold;
+use crate::twin::Stepping;
 
 /// A search and what its report is to hold.
 pub(super) struct Report<'d> {
@@ -115,7 +115,7 @@ impl Report<'_> {
             interrupted: self.found.is_partial,
             integrator: self.finer().map(|step| step.integrator),
             substeps: self.finer().map(|step| step.stepping.substeps),
-            hold: self.other_hold(),
+            hold: self.other_hold().map(|stepping| stepping.hold),
             candidates: known.listed().len() + known.unknown().len(),
             not_tested: not_tested(self.study, &self.found.evidence.listed),
             passes: base.model.problem.passes().so_far(),
@@ -132,11 +132,11 @@ impl Report<'_> {
         self.found.evidence.base.step.filter(|step| !is_own(step))
     }
 
-    /// The rule for inputs between samples that was used in place of the twin's own.
-    fn other_hold(&self) -> Option<Hold> {
+    /// Substeps, and the rule for inputs between samples, where that was used in place of the twin's own.
+    fn other_hold(&self) -> Option<Stepping> {
         let (_, own) = self.study.twin().integration()?;
-        let used = self.found.evidence.base.step?.stepping.hold;
-        (used != own.hold).then_some(used)
+        let used = self.found.evidence.base.step?.stepping;
+        (used.hold != own.hold).then_some(used)
     }
 
     /// Lists what makes the diagnosis doubtful.
@@ -153,7 +153,7 @@ impl Report<'_> {
             self.found.evidence.searched(),
         );
         all.extend(elsewhere.map(|start| Warning::elsewhere(&start, records.len())));
-        all.extend(self.other_hold().map(|hold| Warning::hold(hold, None)));
+        all.extend((self.other_hold()).map(|stepping| Warning::hold(stepping, None)));
         all
     }
 

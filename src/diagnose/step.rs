@@ -69,15 +69,12 @@ pub(in crate::diagnose) fn other_step(
         return Ok(None);
     };
     if asks_hold && let Some(other) = other_hold(&model.problem, &model.fitted)? {
-        let stepping = Stepping {
-            hold: other.hold,
-            ..stepping
-        };
+        let stepping = other.stepping;
         let held = OtherStep {
             integrator,
             stepping,
         };
-        let (base, problem) = (held.of(&model.base), model.problem.held(other.hold));
+        let (base, problem) = (held.of(&model.base), model.problem.stepped(stepping));
         let (Some(base), Some(problem)) = (base, problem) else {
             return Ok(None);
         };

@@ -8,7 +8,7 @@ use crate::math::{is_constant, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
 use crate::setting::number;
 use crate::twin::conformance::coarse_step;
-use crate::twin::{Hold, Twin};
+use crate::twin::{Hold, Stepping, Twin};
 use std::collections::BTreeMap;
 
 /// Code of a free run that diverges.
@@ -119,19 +119,21 @@ impl Warning {
     }
 
     /// A rule for inputs between samples that is not the study's.
-    pub(crate) fn hold(hold: Hold, gain: Option<f64>) -> Self {
-        let rule = match hold {
-            Hold::Zero => "are held at the last sample",
+    pub(crate) fn hold(stepping: Stepping, gain: Option<f64>) -> Self {
+        let rule = match stepping.hold {
+            Hold::Zero => "are held at the last sample (hold = \"zero\")",
             Hold::Linear => "move on a line (hold = \"linear\")",
             Hold::Nearest => "are held at the nearest sample (hold = \"nearest\")",
         };
+        let substeps = stepping.substeps;
         let gain = gain.map_or(String::new(), |gain| {
             format!(
                 ", which explains the records better by {} nats",
                 number(three_digits(gain))
             )
         });
-        let what = format!("between samples, inputs {rule}{gain}; this is used");
+        let what =
+            format!("between samples, inputs {rule}{gain}; this is used, with {substeps} substeps");
         Self::new("inputs-between-samples", what)
     }
 

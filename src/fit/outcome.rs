@@ -3,7 +3,7 @@
 use super::certificate::Side;
 use super::posterior::{Posterior, PosteriorRegion};
 use crate::record::Signal;
-use crate::twin::{Hold, Noise, Role};
+use crate::twin::{Noise, Role, Stepping};
 use serde::Serialize;
 
 /// Settings of a fit.
@@ -59,8 +59,8 @@ pub struct Fit {
     /// Draws of everything unknown, where they were asked for.
     #[serde(skip)]
     pub posterior: Option<Posterior>,
-    /// Rule for inputs between samples that the fit used in place of the study's, as the records ask for; none otherwise.
-    pub hold: Option<Hold>,
+    /// Substeps, and the rule for inputs between samples, that the fit used in place of the twin's, as the records ask for; none otherwise.
+    pub stepping: Option<Stepping>,
     /// Number of samples of all records.
     pub samples: usize,
     /// Wall time in seconds.

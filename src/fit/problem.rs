@@ -5,7 +5,7 @@ use crate::fit::budget::Passes;
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, States};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
-use crate::twin::{Hold, Noise, Outline, Parameter, ParameterSpace, Role, Twin};
+use crate::twin::{Noise, Outline, Parameter, ParameterSpace, Role, Stepping, Twin};
 use std::sync::Arc;
 
 /// Longest step of a fit in the logarithm of a black box's noise level.
@@ -142,9 +142,9 @@ impl Problem {
         self.likelihood.is_simulated()
     }
 
-    /// The same with another rule for inputs between samples; `None` for a black box.
-    pub fn held(&self, hold: Hold) -> Option<Self> {
-        let twin = self.twin.stepped(|_, stepping| stepping.hold = hold)?;
+    /// The same with other substeps and another rule for inputs; `None` for a black box.
+    pub fn stepped(&self, to: Stepping) -> Option<Self> {
+        let twin = self.twin.stepped(|_, stepping| *stepping = to)?;
         let axes = self.axes[..twin.parameters().len()].to_vec();
         Some(Self {
             families: self.families.clone(),

@@ -98,7 +98,7 @@ pub(crate) fn run(
         posterior: (asked.is_some())
             .then(|| table(&problem, &draws, noise.child("starts")))
             .transpose()?,
-        hold: None,
+        stepping: None,
         samples: problem.samples(),
         seconds: clock.elapsed().as_secs_f64(),
         residuals: (problem.filtered(&fitted.theta)?.into_iter())

@@ -8,7 +8,7 @@ use crate::likelihood::{Beliefs, measured};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
-use crate::twin::{Hold, NoiseLevel, StartLevel, Twin};
+use crate::twin::{NoiseLevel, StartLevel, Stepping, Twin};
 use std::time::Instant;
 
 impl Study {
@@ -74,12 +74,12 @@ impl Study {
             Some(best) if study.asks_hold() => other_hold(&searched.problem, best)?,
             _ => None,
         };
-        if let Some(twin) = other.and_then(|other| study.held(other.hold)) {
+        if let Some(twin) = other.and_then(|other| study.with_steps(other.stepping)) {
             (measured, searched) = fitted(&twin)?;
         }
         let mut fit = run(&measured, searched, settings)?.ok_or(StudyError::NoFit)?;
-        fit.hold = other.map(|other| other.hold);
-        (fit.warnings).extend(other.map(|other| Warning::hold(other.hold, Some(other.gain))));
+        fit.stepping = other.map(|other| other.stepping);
+        (fit.warnings).extend(other.map(|other| Warning::hold(other.stepping, Some(other.gain))));
         fit.seconds = clock.elapsed().as_secs_f64();
         stage.tick()?;
         Ok(fit)
@@ -93,7 +93,7 @@ impl Study {
     pub fn score(&self, fit: &Fit, record: &Record) -> Result<FitScore, StudyError> {
         self.check_channels(record)?;
         let study = self.for_records(std::slice::from_ref(record))?;
-        let held = fit.hold.and_then(|hold| study.held(hold));
+        let held = fit.stepping.and_then(|stepping| study.with_steps(stepping));
         let subject = Subject {
             twin: held.as_ref().unwrap_or(&study.twin),
             beliefs: &study.beliefs(),
@@ -106,9 +106,9 @@ impl Study {
         self.file.record.hold.is_none()
     }
 
-    /// The twin with another rule for inputs between samples; `None` for a black box.
-    fn held(&self, hold: Hold) -> Option<Twin> {
-        self.twin.stepped(|_, stepping| stepping.hold = hold)
+    /// The twin with other substeps and another rule for inputs; `None` for a black box.
+    fn with_steps(&self, to: Stepping) -> Option<Twin> {
+        self.twin.stepped(|_, stepping| *stepping = to)
     }
 
     /// Effects that the study's file adds to the twin.

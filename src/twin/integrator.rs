@@ -92,7 +92,7 @@ impl Hold {
 pub(crate) const MOST_SUBSTEPS: usize = 1000;
 
 /// Substeps of the integrator within a sample, and inputs there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Stepping {
     /// Steps of Δt/n within a sample, n ≥ 1.
     pub substeps: usize,

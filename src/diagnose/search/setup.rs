@@ -5,10 +5,12 @@ use super::evidence::{Change, Evidence, Family, Purpose, Question};
 use super::explanations::Explanations;
 use crate::diagnose::base::Base;
 use crate::diagnose::candidates;
+use crate::diagnose::feedback::explains_noise;
 use crate::diagnose::prior::inside;
 use crate::diagnose::settings::{Ablation, DiagnoseSettings};
 use crate::diagnose::step::{OtherStep, other_step};
 use crate::diagnose::thresholds::Thresholds;
+use crate::effect::{TargetKind, targets};
 use crate::fit::Passes;
 use crate::hypothesis::noise::kinds;
 use crate::hypothesis::scales::Scales;
@@ -195,10 +197,13 @@ impl<'s> Setup<'s> {
         }
         let models = question.from.iter().filter_map(|set| known.model(set));
         let seen = models.map(states).collect::<Result<Vec<_>, _>>()?;
-        Ok(chosen(
-            shared(unknown(&self.base.library(), &seen)),
-            question,
-        ))
+        let mut all = unknown(&self.base.library(), &seen);
+        let sensors = targets(TargetKind::Sensor, None, &self.base.model.base.signals());
+        all.retain(|term| {
+            let is_sensor = sensors.contains(&term.target);
+            !explains_noise(term, is_sensor, &self.base.reacting)
+        });
+        Ok(chosen(shared(all), question))
     }
 
     /// The same from the twin with θ inside its prior: what those promise that are not fitted counts what θ gains on its way back.
