@@ -182,6 +182,9 @@ pub struct OutputErrors {
     pub unit: String,
     /// Root mean square of the one-step prediction errors.
     pub one_step: f64,
+    /// Correlation of one-step errors, each in its own standard deviation, with those of the row before: near 0 where the noise is what it
+    /// is taken for; none of fewer than three pairs of rows.
+    pub correlation: Option<f64>,
     /// Root mean square of record − free run, from the start given the record; none where a run diverges.
     pub free_run: Option<f64>,
     /// Standard deviation of the record: what a constant would reach.

@@ -1,9 +1,9 @@
 //! A fit on a record that it has not seen.
 
-use super::follow::free_runs;
+use super::follow::{errors, free_runs};
 use super::outcome::{Fit, OutputErrors};
 use super::problem::Problem;
-use super::run::{Subject, errors};
+use super::run::Subject;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::likelihood::measured;
 use crate::record::{Record, Signal};
@@ -36,7 +36,13 @@ pub(crate) fn score(
             let found = match p.role {
                 Role::Noise => {
                     let level = fit.noise.iter().find(|level| level.name == p.target());
-                    level.map(|level| level.value)
+                    // A level that follows the states is told by what is typical of its records.
+                    let here = measured.levels.iter().find(|l| l.parameter.name == p.name);
+                    let here = here.and_then(|level| level.declared);
+                    level.map(|level| match level.declared.zip(here) {
+                        Some((there, here)) => level.value * (here / there),
+                        None => level.value,
+                    })
                 }
                 // A start belongs to its record.
                 Role::Start => None,

@@ -23,7 +23,7 @@ use serde_json::{Value, json};
 /// | `level` | level of the intervals |
 /// | `log_likelihood`, `evidence` | in nats; `evidence.std_error` is null where Laplace's approximation stands alone |
 /// | `convergence` | `converged`; `distance` to the top in standard deviations; `agreeing` of `searches` |
-/// | `errors` | of each output: root mean square of one-step and free-run errors, deviation of the record |
+/// | `errors` | of each output: root mean square of one-step and free-run errors, deviation of the record; `correlation` of one-step errors with the row before |
 /// | `warnings` | `code`, `what`, `remedy` |
 /// | `posterior` | of posterior draws: names, how many independent ones they are worth, share and mean of each mode; null where none were asked for |
 /// | `samples`, `seconds` | size of the records, time that it took |

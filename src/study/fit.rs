@@ -99,19 +99,18 @@ impl Study {
 
     /// The study's word on noise levels and starts, for likelihoods of measured records.
     pub(crate) fn beliefs(&self) -> Beliefs {
-        let declared = (self.file.noise.iter()).filter_map(|(name, level)| match level {
-            NoiseLevel::Declared(level) => Some((name.clone(), level.known, level.factor)),
-            _ => None,
+        let noise = &self.file.noise;
+        let factors = (noise.levels.iter()).filter_map(|(name, level)| match level {
+            NoiseLevel::Declared(level) => Some((name.clone(), level.factor)),
+            NoiseLevel::Estimate => None,
         });
         let starts = (self.file.start.iter())
             .filter(|(_, level)| matches!(level, StartLevel::Declared { .. }));
         Beliefs {
             // A study without a plan has been given the one of its records.
             step: self.plan.as_ref().map_or(1.0, |plan| plan.step),
-            known: (declared.clone().filter(|(_, known, _)| *known))
-                .map(|(name, ..)| name)
-                .collect(),
-            factors: declared.map(|(name, _, factor)| (name, factor)).collect(),
+            known: noise.known(self.base.outline().as_ref()),
+            factors: factors.collect(),
             estimated: (self.file.start.iter())
                 .filter(|(_, level)| matches!(level, StartLevel::Estimate))
                 .map(|(name, _)| name.clone())

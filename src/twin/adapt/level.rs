@@ -51,7 +51,27 @@ pub(crate) enum Per {
     Second,
 }
 
+impl DeclaredNoise {
+    /// A level that is not fitted, a state's per step.
+    pub(crate) fn known(std: f64) -> Self {
+        Self {
+            std,
+            known: true,
+            factor: usual_factor(),
+            per: Per::Step,
+        }
+    }
+}
+
 impl NoiseLevel {
+    /// Returns whether the level says of itself that it is to be found.
+    pub(crate) fn is_open(&self) -> bool {
+        match self {
+            Self::Declared(level) => !level.known && !is_usual_factor(&level.factor),
+            Self::Estimate => true,
+        }
+    }
+
     /// A declared level, a state's per step.
     pub(crate) fn declared(std: f64) -> Self {
         Self::Declared(DeclaredNoise {
