@@ -99,7 +99,7 @@ pub struct FittedValue {
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct FittedNoise {
-    /// State or output.
+    /// State or output; `y.share` is the share of |y| that is added to the level of `y`.
     pub name: String,
     /// `process` or `measurement`.
     pub role: &'static str,

@@ -3,6 +3,7 @@
 use super::{Study, StudyError};
 use crate::effect::Effect;
 use crate::fit::{Fit, FitScore, FitSettings, Subject, run, score};
+use crate::hypothesis::search::asked::with_asked_noise;
 use crate::hypothesis::search::effects::searched;
 use crate::likelihood::{Beliefs, measured};
 use crate::progress::Progress;
@@ -14,7 +15,8 @@ use std::time::Instant;
 impl Study {
     /// Finds the most probable parameters of the twin, given measured records of one system: no training, no simulations of a prior.
     ///
-    /// Noise levels are fitted with the parameters, and the first state is uncertain, unless the study says that they are known.
+    /// Noise levels are fitted with the parameters, and the first state is uncertain, unless the study says that they are known. Where the
+    /// records ask for it, the noise of an output grows with its signal.
     /// θ has a weak normal prior in φ (log θ where bounds are positive) of the prior box's width, 0.6 at least; bounds hold.
     ///
     /// ```
@@ -49,6 +51,17 @@ impl Study {
         settings: &FitSettings,
         progress: &Progress,
     ) -> Result<Fit, StudyError> {
+        self.fit_asking(true, records, settings, progress)
+    }
+
+    /// As [`fit_with`](Self::fit_with); without asking, noise levels stay as they depend on the states in the twin.
+    pub(crate) fn fit_asking(
+        &self,
+        asks_for_noise: bool,
+        records: &[Record],
+        settings: &FitSettings,
+        progress: &Progress,
+    ) -> Result<Fit, StudyError> {
         let level = settings.level;
         SettingError::unless(
             level > 0.0 && level < 1.0,
@@ -65,7 +78,11 @@ impl Study {
         let effects = study.added_effects()?;
         let stage = progress.stage("fit", 1);
         let measured = measured(&study.twin, records, &study.beliefs())?;
-        let searched = searched(&measured, &effects, records.into(), settings.noise())?;
+        let noise = settings.noise();
+        let mut searched = searched(&measured, &effects, records.into(), noise)?;
+        if asks_for_noise {
+            searched = with_asked_noise(&measured, searched, noise)?;
+        }
         let mut fit = run(&measured, searched, settings)?.ok_or(StudyError::NoFit)?;
         fit.seconds = clock.elapsed().as_secs_f64();
         stage.tick()?;
