@@ -4,7 +4,6 @@ use truetwin::diagnose::{DiagnoseSettings, Verdict, diagnose};
 use truetwin::fit::Fit;
 use truetwin::prelude::*;
 use truetwin::study::{ProcessNoise, StudyFile};
-use truetwin::twins::VanDerPol;
 
 /// A substance that decays from 2: ẋ = −k·x. No noise is declared.
 struct Decay;

@@ -5,7 +5,7 @@ use crate::twin::{LevelValue, Parameter, Role, Twin, TwinPart};
 /// Largest share of its signal that noise may be: what says less of its signal is no reading of it. Half of it leaves out counts of few
 /// events; twice as much changes no answer.
 pub(crate) const LARGEST_SHARE: f64 = 0.5;
-/// What the name of a share has behind that of its output.
+/// Ending of the name of a share, behind that of its output.
 const SUFFIX: &str = ".share";
 
 /// Returns the twin with noise of an output that grows with its signal, θ longer by the share.
