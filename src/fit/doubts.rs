@@ -18,7 +18,7 @@ pub(crate) const DIVERGES: &str = "free-run-diverges";
 pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 18] = [
+const REMEDIES: [(&str, &str); 19] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",

@@ -182,7 +182,7 @@ pub(super) fn swallowed(
         return Ok(None);
     };
     let smoothed = quiet.smoothed(&alone.theta)?;
-    let runs = free_runs(&quiet, &alone.theta, &smoothed);
+    let runs = free_runs(&quiet, &alone.theta, &smoothed)?;
     let alone = errors(&quiet, &alone.theta, &runs)?;
     let all = (fitted_errors.iter().zip(alone)).filter_map(|(own, alone)| {
         let (with, without) = (own.free_run?, alone.free_run?);
