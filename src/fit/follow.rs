@@ -5,7 +5,7 @@ use super::outcome::{FittedStart, OutputErrors};
 use super::problem::Problem;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::Level;
-use crate::likelihood::kalman::{FilterError, States};
+use crate::likelihood::kalman::{FilterError, States, recoverable};
 use crate::math::deviation;
 use crate::record::Signal;
 use crate::twin::begun;
@@ -181,9 +181,13 @@ pub(super) fn swallowed(
     let Some(alone) = fit(&quiet, &starts, ITERATIONS)? else {
         return Ok(None);
     };
-    let smoothed = quiet.smoothed(&alone.theta)?;
+    let Some(smoothed) = recoverable(quiet.smoothed(&alone.theta))? else {
+        return Ok(None);
+    };
     let runs = free_runs(&quiet, &alone.theta, &smoothed)?;
-    let alone = errors(&quiet, &alone.theta, &runs)?;
+    let Some(alone) = recoverable(errors(&quiet, &alone.theta, &runs))? else {
+        return Ok(None);
+    };
     let all = (fitted_errors.iter().zip(alone)).filter_map(|(own, alone)| {
         let (with, without) = (own.free_run?, alone.free_run?);
         let is_better = without.powi(2) < (1.0 - SWALLOWED) * with.powi(2);
