@@ -109,7 +109,8 @@ impl Report<'_> {
             validation_runs: (self.validation)
                 .map(|records| self.free_runs(records, accepted))
                 .transpose()?,
-            correlated_noise: base.noise_at(|part| !matches!(part, Part::Effect { .. })),
+            correlated_noise: base.noise_at(|part| matches!(part, Part::Disturbance { .. })),
+            proportional_noise: base.noise_at(|part| matches!(part, Part::Share { .. })),
             outliers: base.noise_at(|part| matches!(part, Part::Effect { .. })),
             quick: settings.quick,
             interrupted: self.found.is_partial,

@@ -1,6 +1,7 @@
 //! Reasons to doubt a result: one list for `fit`, `estimate` and `diagnose`, one wording each.
 
 use super::certificate::Side;
+use super::follow::Swallowed;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
 use crate::likelihood::StartElsewhere;
@@ -17,7 +18,7 @@ pub(crate) const DIVERGES: &str = "free-run-diverges";
 pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 19] = [
+const REMEDIES: [(&str, &str); 20] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",
@@ -67,6 +68,10 @@ const REMEDIES: [(&str, &str); 19] = [
     (
         NOT_CONVERGED,
         "narrow the priors, or fix a parameter that the record does not identify",
+    ),
+    (
+        "process-noise",
+        "if the twin is deterministic, declare that it has no process noise, and fit again",
     ),
     (
         "refinement-worse",
@@ -275,6 +280,19 @@ impl<'a> Doubts<'a> {
                 Some(_) => {}
             }
         }
+    }
+
+    /// Warns of process noise that explains what parameters could.
+    pub fn swallowed(&mut self, swallowed: Option<Swallowed>) {
+        let Some(output) = swallowed else { return };
+        let told = |value| number(three_digits(value));
+        let what = format!(
+            "process noise of which nothing is declared explains what parameters could: the free run of {} is off by {}, fitted without that noise by {}",
+            output.name,
+            told(output.with),
+            told(output.without)
+        );
+        self.warn("process-noise", what);
     }
 
     /// Warns of channels that never move, and of a step that is too long for the fitted twin: a free run that diverges says nothing of

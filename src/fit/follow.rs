@@ -1,8 +1,12 @@
-//! Starts and free runs: the way in which a fitted twin follows its records.
+//! Starts, free runs and errors: the way in which a fitted twin follows its records.
 
-use super::outcome::FittedStart;
+use super::climb::{Fitted, fit};
+use super::outcome::{FittedStart, OutputErrors};
 use super::problem::Problem;
-use crate::likelihood::kalman::{FilterError, States};
+use crate::fit::budget::ITERATIONS;
+use crate::likelihood::Level;
+use crate::likelihood::kalman::{FilterError, States, recoverable};
+use crate::math::deviation;
 use crate::record::Signal;
 use crate::twin::begun;
 
@@ -51,4 +55,147 @@ pub(crate) fn free_runs(
             }
         })
         .collect()
+}
+
+/// Errors of each output that the records have at the full θ.
+pub(super) fn errors(
+    problem: &Problem,
+    theta: &[f64],
+    free_runs: &[Option<Signal>],
+) -> Result<Vec<OutputErrors>, FilterError> {
+    let filtered = problem.filtered(theta)?;
+    let outputs = problem.outline().outputs;
+    let rms = |values: &[f64]| {
+        (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    };
+    // A record may lack a sensor.
+    let there = |j: &usize| problem.records.iter().any(|record| record.has_output(*j));
+    Ok((0..outputs.len())
+        .filter(there)
+        .map(|j| {
+            let output = &outputs[j];
+            let (mut one_step, mut free, mut all) = (vec![], vec![], vec![]);
+            let mut correlation = LagOne::default();
+            for (r, record) in problem.records.iter().enumerate() {
+                correlation.begin();
+                for k in 0..record.samples() {
+                    let y = record.outputs()[[k, j]];
+                    if !y.is_finite() {
+                        continue;
+                    }
+                    all.push(y);
+                    // The first row is predicted from the start, which a record is not to be judged by.
+                    if k > 0 {
+                        one_step.push(filtered[r].innovations[[k, j]]);
+                        correlation.add(k, filtered[r].standardised[[k, j]]);
+                    }
+                    if let Some(run) = &free_runs[r] {
+                        free.push(y - run[[k, j]]);
+                    }
+                }
+            }
+            OutputErrors {
+                name: output.name.clone(),
+                unit: output.unit.clone(),
+                one_step: rms(&one_step),
+                correlation: correlation.value(),
+                free_run: free_runs.iter().all(Option::is_some).then(|| rms(&free)),
+                deviation: deviation(&all),
+            }
+        })
+        .collect())
+}
+
+/// Correlation of values with those a row before, over the present ones.
+#[derive(Default)]
+struct LagOne {
+    before: Option<(usize, f64)>,
+    squares: f64,
+    products: f64,
+    pairs: usize,
+}
+
+impl LagOne {
+    /// Begins a record.
+    fn begin(&mut self) {
+        self.before = None;
+    }
+
+    fn add(&mut self, k: usize, value: f64) {
+        if let Some((_, before)) = self.before.filter(|(at, _)| at + 1 == k) {
+            self.products += before * value;
+            self.pairs += 1;
+        }
+        self.squares += value * value;
+        self.before = Some((k, value));
+    }
+
+    /// Returns the correlation; none of fewer than three pairs.
+    fn value(&self) -> Option<f64> {
+        (self.pairs > 2 && self.squares > 0.0).then(|| self.products / self.squares)
+    }
+}
+
+/// Share of the variance of a free run's error that must go with the process noise before a fit speaks of it. A quarter of it is seen beside
+/// twins that lack a little, too; of twice as much, nothing would be left.
+const SWALLOWED: f64 = 0.5;
+
+/// An output that the twin follows much better if it is fitted without process noise.
+pub(super) struct Swallowed {
+    pub name: String,
+    /// Root mean square of the error of the free run.
+    pub with: f64,
+    /// The same of the twin fitted without process noise.
+    pub without: f64,
+}
+
+/// Fits the twin without the process noise of which nothing is declared, where the free run says much less of the record than the one-step
+/// predictions; returns the output that it follows better by most.
+pub(super) fn swallowed(
+    problem: &Problem,
+    fitted: &Fitted,
+    levels: &[Level],
+    fitted_errors: &[OutputErrors],
+) -> Result<Option<Swallowed>, FilterError> {
+    let space = problem.twin.parameters();
+    let is_free = |name: &str| {
+        let level = levels.iter().find(|level| level.parameter.name == name);
+        level.is_some_and(|level| level.is_process && level.declared.is_none())
+    };
+    let loses = |e: &OutputErrors| {
+        let free = e.free_run.unwrap_or(f64::INFINITY);
+        e.one_step.powi(2) < (1.0 - SWALLOWED) * free.powi(2)
+    };
+    if !space.iter().any(|p| is_free(&p.name)) || !fitted_errors.iter().any(loses) {
+        return Ok(None);
+    }
+    let mut axes = problem.axes[..space.len()].to_vec();
+    for (axis, p) in axes.iter_mut().zip(space.iter()) {
+        if is_free(&p.name) {
+            let none = axis.bounds.low();
+            (axis.centre, axis.begin, axis.held) = (none, Some(none), true);
+        }
+    }
+    let quiet = problem.with_twin(problem.twin.clone(), axes);
+    let starts = [&fitted.theta, &quiet.centre()].map(|theta| quiet.begin(theta));
+    let Some(alone) = fit(&quiet, &starts, ITERATIONS)? else {
+        return Ok(None);
+    };
+    let Some(smoothed) = recoverable(quiet.smoothed(&alone.theta))? else {
+        return Ok(None);
+    };
+    let runs = free_runs(&quiet, &alone.theta, &smoothed)?;
+    let Some(alone) = recoverable(errors(&quiet, &alone.theta, &runs))? else {
+        return Ok(None);
+    };
+    let all = (fitted_errors.iter().zip(alone)).filter_map(|(own, alone)| {
+        let (with, without) = (own.free_run?, alone.free_run?);
+        let is_better = without.powi(2) < (1.0 - SWALLOWED) * with.powi(2);
+        is_better.then(|| Swallowed {
+            name: own.name.clone(),
+            with,
+            without,
+        })
+    });
+    Ok(all.min_by(|a, b| (a.without / a.with).total_cmp(&(b.without / b.with))))
 }

@@ -100,7 +100,7 @@ pub struct FittedValue {
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct FittedNoise {
-    /// State or output.
+    /// State or output; `y.share` is the share of |y| that is added to the level of `y`.
     pub name: String,
     /// `process` or `measurement`.
     pub role: &'static str,
@@ -183,6 +183,9 @@ pub struct OutputErrors {
     pub unit: String,
     /// Root mean square of the one-step prediction errors.
     pub one_step: f64,
+    /// Correlation of one-step errors, each in its own standard deviation, with those of the row before: near 0 where the noise is what it
+    /// is taken for; none of fewer than three pairs of rows.
+    pub correlation: Option<f64>,
     /// Root mean square of record − free run, from the start given the record; none where a run diverges.
     pub free_run: Option<f64>,
     /// Standard deviation of the record: what a constant would reach.

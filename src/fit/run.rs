@@ -4,10 +4,8 @@ use super::certificate::{Certificate, restarted};
 use super::climb::{Fitted, climb};
 use super::doubts::Doubts;
 use super::evidence::evidence;
-use super::follow::{free_runs, starts};
-use super::outcome::{
-    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, OutputErrors,
-};
+use super::follow::{errors, free_runs, starts, swallowed};
+use super::outcome::{Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue};
 use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
 use super::problem::Problem;
 use super::searched::Searched;
@@ -15,8 +13,6 @@ use super::starts::polish;
 use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, Measured};
-use crate::math::deviation;
-use crate::record::Signal;
 use crate::twin::{Noise, Role, Twin};
 use std::time::Instant;
 
@@ -78,6 +74,7 @@ pub(crate) fn run(
     doubts.start(measured.elsewhere.as_ref());
     doubts.bounds(&parameters, &noise_levels, &off);
     doubts.runs(&errors);
+    doubts.swallowed(swallowed(&problem, &fitted, levels, &errors)?);
     doubts.records(free_runs.iter().all(Option::is_some));
     Ok(Some(Fit {
         parameters,
@@ -176,49 +173,4 @@ fn values(
         });
     }
     (parameters, noise)
-}
-
-/// Errors of each output that the records have at the full θ.
-pub(super) fn errors(
-    problem: &Problem,
-    theta: &[f64],
-    free_runs: &[Option<Signal>],
-) -> Result<Vec<OutputErrors>, FilterError> {
-    let filtered = problem.filtered(theta)?;
-    let outputs = problem.outline().outputs;
-    let rms = |values: &[f64]| {
-        (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
-    };
-    // A record may lack a sensor.
-    let there = |j: &usize| problem.records.iter().any(|record| record.has_output(*j));
-    Ok((0..outputs.len())
-        .filter(there)
-        .map(|j| {
-            let output = &outputs[j];
-            let (mut one_step, mut free, mut all) = (vec![], vec![], vec![]);
-            for (r, record) in problem.records.iter().enumerate() {
-                for k in 0..record.samples() {
-                    let y = record.outputs()[[k, j]];
-                    if !y.is_finite() {
-                        continue;
-                    }
-                    all.push(y);
-                    // The first row is predicted from the start, which a record is not to be judged by.
-                    if k > 0 {
-                        one_step.push(filtered[r].innovations[[k, j]]);
-                    }
-                    if let Some(run) = &free_runs[r] {
-                        free.push(y - run[[k, j]]);
-                    }
-                }
-            }
-            OutputErrors {
-                name: output.name.clone(),
-                unit: output.unit.clone(),
-                one_step: rms(&one_step),
-                free_run: free_runs.iter().all(Option::is_some).then(|| rms(&free)),
-                deviation: deviation(&all),
-            }
-        })
-        .collect())
 }

@@ -266,7 +266,7 @@ pub(super) fn uniform_axis(parameter: &Parameter, is_log: bool) -> Axis {
 }
 
 /// Axis of the size of an effect that is as large as the twin's own terms at `largest`.
-fn size_axis(parameter: &Parameter, largest: f64) -> Axis {
+pub(super) fn size_axis(parameter: &Parameter, largest: f64) -> Axis {
     Axis {
         centre: 0.0,
         deviation: 2.0 * largest,

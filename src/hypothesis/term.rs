@@ -4,6 +4,7 @@ use super::entry::{Entered, Entry, disturbed, with_function};
 use crate::effect::{Effect, EffectKey, Magnitude, Shape, augment_late};
 use crate::fit::axis::Axis;
 use crate::likelihood::kalman::FilterError;
+use crate::likelihood::with_share;
 use crate::twin::{Twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -37,6 +38,8 @@ pub(crate) enum Part {
     },
     /// A disturbance that keeps a share `memory` of itself at each step.
     Disturbance { entry: Entry, memory: f64 },
+    /// Noise of an output that grows with its signal.
+    Share { output: usize },
     /// A function that enters at an output or in a parameter.
     Function(Entered),
 }
@@ -110,7 +113,7 @@ impl Term {
     pub fn is_noise(&self) -> bool {
         match &self.part {
             Part::Effect { effect, .. } => effect.law().is_noise(),
-            Part::Disturbance { .. } => true,
+            Part::Disturbance { .. } | Part::Share { .. } => true,
             Part::Function(_) => false,
         }
     }
@@ -127,7 +130,7 @@ impl Term {
                 self.nature == Nature::Listed
                     && (effect.magnitudes().iter()).any(|m| m.shape == Shape::Frequency)
             }
-            Part::Disturbance { .. } | Part::Function(_) => false,
+            Part::Disturbance { .. } | Part::Share { .. } | Part::Function(_) => false,
         }
     }
 
@@ -142,7 +145,7 @@ impl Term {
             Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
                 .filter(|m| !held.contains_key(m.name))
                 .collect(),
-            Part::Disturbance { .. } | Part::Function(_) => vec![],
+            Part::Disturbance { .. } | Part::Share { .. } | Part::Function(_) => vec![],
         }
     }
 
@@ -175,7 +178,7 @@ impl Term {
             Part::Effect { effect, .. } => (self.free().iter())
                 .map(|m| effect.key().magnitude(m.name))
                 .collect(),
-            Part::Disturbance { .. } | Part::Function(_) => vec![],
+            Part::Disturbance { .. } | Part::Share { .. } | Part::Function(_) => vec![],
         }
     }
 }
@@ -197,6 +200,7 @@ pub(crate) fn with_terms<'t>(
     Ok(terms.fold(twin, |twin, term| match term.part {
         Part::Effect { .. } => twin,
         Part::Disturbance { entry, memory } => disturbed(&twin, entry, memory),
+        Part::Share { output } => with_share(&twin, output),
         Part::Function(function) => with_function(&twin, function),
     }))
 }

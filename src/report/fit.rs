@@ -18,12 +18,12 @@ use serde_json::{Value, json};
 /// | key | holds |
 /// |---|---|
 /// | `parameters` | name, unit, value, standard error, interval, prior, bounds; `prior_share`: variance over the prior's; `at_bound`: `low`, `high` or null |
-/// | `noise` | fitted levels: states in units per √s, outputs in their own; `declared` is null where nothing was declared; `at_bound` as of parameters |
+/// | `noise` | fitted levels: states in units per √s, outputs in their own, `y.share` the share of \|y\| that is added to that of `y`; `declared` is null where nothing was declared; `at_bound` as of parameters |
 /// | `starts` | states at the first sample of each record, given all of it |
 /// | `level` | level of the intervals |
 /// | `log_likelihood`, `evidence` | in nats; `evidence.std_error` is null where Laplace's approximation stands alone |
 /// | `convergence` | `converged`; `distance` to the top in standard deviations; `agreeing` of `searches` |
-/// | `errors` | of each output: root mean square of one-step and free-run errors, deviation of the record |
+/// | `errors` | of each output: root mean square of one-step and free-run errors, deviation of the record; `correlation` of one-step errors with the row before |
 /// | `warnings` | `code`, `what`, `remedy` |
 /// | `posterior` | of posterior draws: names, how many independent ones they are worth, share and mean of each mode; null where none were asked for |
 /// | `samples`, `seconds` | size of the records, time that it took |
@@ -152,7 +152,10 @@ fn levels(fit: &Fit) -> Vec<Block> {
     let noise = |level: &FittedNoise| {
         let [value, error] = with_error(level.value, level.std_error);
         vec![
-            level.name.clone(),
+            match level.name.strip_suffix(".share") {
+                Some(output) => format!("{output}, share of |{output}|"),
+                None => level.name.clone(),
+            },
             value,
             error,
             level.declared.map_or(String::new(), short),

@@ -7,9 +7,10 @@ use crate::setting::number;
 use crate::storage::files::folder;
 use crate::storage::untrusted::{check_names, message, read_text};
 use crate::study::error::StudyError;
+use crate::study::noise_table::NoiseTable;
 use crate::study::plan::InputPlan;
 use crate::study::tables::{Library, PriorTable, RecordTable, check_shapes, dotted};
-use crate::twin::{Interval, NoiseLevel, StartLevel, TwinError};
+use crate::twin::{Interval, StartLevel, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -45,6 +46,7 @@ const MOST: u64 = 1 << 20;
 /// h1 = 0.1          # declared: standard deviation of the increment a step of the study
 /// h2 = { std = 0.05, known = true, per = "second" }   # not fitted; in units of the state per √s
 /// y = "estimate"    # a parameter of its own, which an estimator learns
+/// process = "fitted"   # of all other states; "none": a deterministic twin, "declared": held as the twin declares it
 /// [start]
 /// h1 = { mean = 2.0, std = 0.5 }   # or a value that is known, or "estimate"
 /// [features]
@@ -82,8 +84,8 @@ pub struct StudyFile {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) limits: BTreeMap<String, Interval>,
     /// Noise of states and outputs.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub(crate) noise: BTreeMap<String, NoiseLevel>,
+    #[serde(skip_serializing_if = "NoiseTable::is_empty")]
+    pub(crate) noise: NoiseTable,
     /// Starts of states.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) start: BTreeMap<String, StartLevel>,
@@ -209,6 +211,7 @@ fn line(text: &str, byte: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::twin::NoiseLevel;
 
     fn parse(text: &str) -> Result<StudyFile, String> {
         StudyFile::parse(text, Path::new("s.toml")).map_err(|e| e.to_string())
@@ -236,6 +239,7 @@ mod tests {
             [noise]
             h1 = 0
             y = "estimate"
+            process = "declared"
             [start]
             h1 = "estimate"
             h2 = 5.2
@@ -253,7 +257,7 @@ mod tests {
             Interval::new(0.0, 10.0).unwrap()
         );
         assert!(file.prior.trust);
-        assert_eq!(file.noise["y"], NoiseLevel::Estimate);
+        assert_eq!(file.noise.levels["y"], NoiseLevel::Estimate);
         assert_eq!(file.start["h2"], StartLevel::known(5.2));
         let written = toml::to_string(&file).unwrap();
         let again = parse(&written).unwrap();
@@ -291,6 +295,10 @@ mod tests {
             ("twin = 'x'\n[record]\nsubsteps = 1e9\n", "s.toml, line 3"),
             ("twin = 'x'\n[record]\nsubsteps = -1\n", "s.toml, line 3"),
             ("twin = 'x'\n[noise]\ny = 'guess'\n", "s.toml, line 3"),
+            (
+                "twin = 'x'\n[noise]\nprocess = 'no'\n",
+                "s.toml, line 3: process is \"none\", \"fitted\" or \"declared\"",
+            ),
         ] {
             let message = parse(text).unwrap_err();
             assert!(message.contains(expected), "{message}");

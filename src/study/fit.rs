@@ -3,6 +3,7 @@
 use super::{Study, StudyError};
 use crate::effect::Effect;
 use crate::fit::{Fit, FitScore, FitSettings, Subject, Warning, other_hold, run, score};
+use crate::hypothesis::search::asked::with_asked_noise;
 use crate::hypothesis::search::effects::searched;
 use crate::likelihood::{Beliefs, measured};
 use crate::progress::Progress;
@@ -14,7 +15,8 @@ use std::time::Instant;
 impl Study {
     /// Finds the most probable parameters of the twin, given measured records of one system: no training, no simulations of a prior.
     ///
-    /// Noise levels are fitted with the parameters, and the first state is uncertain, unless the study says that they are known.
+    /// Noise levels are fitted with the parameters, and the first state is uncertain, unless the study says that they are known. Where the
+    /// records ask for it, the noise of an output grows with its signal.
     /// θ has a weak normal prior in φ (log θ where bounds are positive) of the prior box's width, 0.6 at least; bounds hold.
     ///
     /// ```
@@ -49,6 +51,17 @@ impl Study {
         settings: &FitSettings,
         progress: &Progress,
     ) -> Result<Fit, StudyError> {
+        self.fit_asking(true, records, settings, progress)
+    }
+
+    /// As [`fit_with`](Self::fit_with); without asking, noise levels stay as they depend on the states in the twin.
+    pub(crate) fn fit_asking(
+        &self,
+        asks_for_noise: bool,
+        records: &[Record],
+        settings: &FitSettings,
+        progress: &Progress,
+    ) -> Result<Fit, StudyError> {
         let level = settings.level;
         SettingError::unless(
             level > 0.0 && level < 1.0,
@@ -64,9 +77,10 @@ impl Study {
         let study = self.for_records(records)?;
         let effects = study.added_effects()?;
         let stage = progress.stage("fit", 1);
+        let noise = settings.noise();
         let fitted = |twin: &Twin| -> Result<_, StudyError> {
             let measured = measured(twin, records, &study.beliefs())?;
-            let searched = searched(&measured, &effects, records.into(), settings.noise())?;
+            let searched = searched(&measured, &effects, records.into(), noise)?;
             Ok((measured, searched))
         };
         let (mut measured, mut searched) = fitted(&study.twin)?;
@@ -76,6 +90,9 @@ impl Study {
         };
         if let Some(twin) = other.and_then(|other| study.with_steps(other.stepping)) {
             (measured, searched) = fitted(&twin)?;
+        }
+        if asks_for_noise {
+            searched = with_asked_noise(&measured, searched, noise)?;
         }
         let mut fit = run(&measured, searched, settings)?.ok_or(StudyError::NoFit)?;
         fit.stepping = other.map(|other| other.stepping);
@@ -123,19 +140,18 @@ impl Study {
 
     /// The study's word on noise levels and starts, for likelihoods of measured records.
     pub(crate) fn beliefs(&self) -> Beliefs {
-        let declared = (self.file.noise.iter()).filter_map(|(name, level)| match level {
-            NoiseLevel::Declared(level) => Some((name.clone(), level.known, level.factor)),
-            _ => None,
+        let noise = &self.file.noise;
+        let factors = (noise.levels.iter()).filter_map(|(name, level)| match level {
+            NoiseLevel::Declared(level) => Some((name.clone(), level.factor)),
+            NoiseLevel::Estimate => None,
         });
         let starts = (self.file.start.iter())
             .filter(|(_, level)| matches!(level, StartLevel::Declared { .. }));
         Beliefs {
             // A study without a plan has been given the one of its records.
             step: self.plan.as_ref().map_or(1.0, |plan| plan.step),
-            known: (declared.clone().filter(|(_, known, _)| *known))
-                .map(|(name, ..)| name)
-                .collect(),
-            factors: declared.map(|(name, _, factor)| (name, factor)).collect(),
+            known: noise.known(self.base.outline().as_ref()),
+            factors: factors.collect(),
             estimated: (self.file.start.iter())
                 .filter(|(_, level)| matches!(level, StartLevel::Estimate))
                 .map(|(name, _)| name.clone())

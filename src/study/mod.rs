@@ -4,12 +4,15 @@ mod error;
 mod file;
 mod fit;
 mod manifest;
+mod noise_table;
 mod plan;
 mod suitability;
 mod tables;
 
 pub use error::StudyError;
 pub use file::StudyFile;
+pub(crate) use noise_table::NoiseTable;
+pub use noise_table::ProcessNoise;
 pub(crate) use plan::DriveSource;
 pub(crate) use plan::InputPlan;
 #[cfg(feature = "fmi")]
@@ -119,6 +122,17 @@ impl Study {
         self
     }
 
+    /// Returns the study with one word for the process noise of all states that its file has no entry of.
+    ///
+    /// # Errors
+    ///
+    /// [`StudyError`]: a black box, or an entry that contradicts the word.
+    pub fn with_process_noise(&self, process: ProcessNoise) -> Result<Self, StudyError> {
+        let mut file = self.file.clone();
+        file.noise.process = Some(process);
+        self.configure(&file)
+    }
+
     /// The study in the setting of a file about the same twin. θ becomes: the twin's parameters that are not fixed,
     /// unknown noise levels, unknown starts, effects' magnitudes that are not given. Of a file before, the plan of records stays alone.
     pub fn configure(&self, file: &StudyFile) -> Result<Self, StudyError> {
@@ -140,7 +154,7 @@ impl Study {
         let declares = |level: &NoiseLevel| matches!(level, NoiseLevel::Declared(_));
         let step = match &plan {
             Some(plan) => plan.step,
-            None if !file.noise.values().any(declares) => 1.0,
+            None if !file.noise.levels.values().any(declares) => 1.0,
             None => return Err(StudyError::NoPlan),
         };
         for (table, boxes) in [("prior", &file.prior.boxes), ("bounds", &file.bounds)] {
@@ -156,7 +170,7 @@ impl Study {
             prior: part(&file.prior.boxes, false),
             bounds: part(&file.bounds, false),
             limits: file.limits.clone(),
-            noise: file.noise.clone(),
+            noise: (file.noise).entries(self.base.outline().as_ref())?,
             start: file.start.clone(),
         };
         let second = Adaptation {

@@ -25,11 +25,11 @@ mod parameter;
 mod points;
 mod state_space;
 
-pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt, begun, fix};
+pub(crate) use adapt::{Adaptation, DeclaredNoise, NoiseLevel, StartLevel, adapt, begun, fix};
 pub(crate) use composed::{
     Acting, DeadTime, Disturbance, Entry, FittedLevels, KnownNoise, LARGEST, Law, LawPart,
-    LawPlace, LevelSource, NoisePart, ParameterChange, RateChange, SensorNoise, SignalChange,
-    StateLimit, TwinPart, WhiteLevel,
+    LawPlace, LevelSource, LevelValue, NoisePart, ParameterChange, RateChange, SensorNoise,
+    SignalChange, StateLimit, TwinPart, WhiteLevel,
 };
 pub use composed::{Composed, ComposedBlackBox, DigitalTwin};
 pub(crate) use definitions::rates;

@@ -17,6 +17,7 @@ mod filter;
 mod fit;
 mod golden;
 mod misspecification;
+mod noise;
 mod numbers;
 mod records;
 mod suitability;

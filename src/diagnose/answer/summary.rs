@@ -77,7 +77,7 @@ fn fit_of(model: &Model, term: &Term, probability: f64, log_evidence: f64) -> Ef
                 Some((m.name.to_owned(), value))
             })
             .collect(),
-        Part::Disturbance { .. } | Part::Function(_) => vec![],
+        Part::Disturbance { .. } | Part::Share { .. } | Part::Function(_) => vec![],
     };
     EffectFit {
         id: term.id.clone(),
@@ -193,7 +193,7 @@ pub(in crate::diagnose) fn nuisance(
 fn noise_names(term: &Term) -> Vec<String> {
     match &term.part {
         Part::Effect { .. } => term.names(),
-        Part::Disturbance { .. } | Part::Function(_) => vec![term.key()],
+        Part::Disturbance { .. } | Part::Share { .. } | Part::Function(_) => vec![term.key()],
     }
 }
 

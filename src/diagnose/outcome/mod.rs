@@ -295,6 +295,8 @@ pub struct Diagnosis {
     pub discovery: Option<Discovery>,
     /// Sensors and states whose noise is correlated, as the records ask for.
     pub correlated_noise: Vec<String>,
+    /// Sensors whose noise grows with the signal, as the records ask for.
+    pub proportional_noise: Vec<String>,
     /// Sensors whose noise has outliers, as the records ask for.
     pub outliers: Vec<String>,
     /// True for a quick look: effects were tried one at a time.

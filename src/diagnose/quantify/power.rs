@@ -60,7 +60,7 @@ fn first_magnitude(term: &Term) -> String {
         Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
             .find(|m| !held.contains_key(m.name))
             .map_or_else(String::new, |m| m.name.to_owned()),
-        Part::Disturbance { .. } | Part::Function(_) => String::new(),
+        Part::Disturbance { .. } | Part::Share { .. } | Part::Function(_) => String::new(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Search;
 use super::evidence::{Evidence, Purpose, Question};
-use super::explanations::are_outliers_elsewhere;
+use super::explanations::is_noise_apart;
 use crate::diagnose::thresholds::Thresholds;
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::search::{Breadth, FEW};
@@ -100,9 +100,7 @@ impl<E: Evidence> Search<E> {
         }
         let best = best?;
         let question = self.ask(Purpose::Outliers, best.set())?;
-        let outliers = noise
-            .into_iter()
-            .filter(|e| are_outliers_elsewhere(e, best));
+        let outliers = noise.into_iter().filter(|e| is_noise_apart(e, best));
         Some(question.only(keys(outliers)).with(Breadth::of_all))
     }
 

@@ -258,7 +258,7 @@ impl Explanations {
         all
     }
 
-    /// The kind of noise alone that the records ask for beside listed effects: outliers beside the best one, or any kind that explains more
+    /// The kind of noise alone that the records ask for beside listed effects: outliers and noise that grows with the signal beside the best one, or any kind that explains more
     /// beside one effect of the best pair than the other effect does and leaves nothing. Correlated noise beside an effect would otherwise
     /// pass for what that leaves.
     pub fn asks_for_noise_beside(&self) -> Option<&Explanation> {
@@ -268,7 +268,7 @@ impl Explanations {
             None => {
                 let best = self.listed().into_iter().next()?;
                 let mut all = self.noise_beside(best).into_iter();
-                all.find(|e| are_outliers_elsewhere(e, best))?
+                all.find(|e| is_noise_apart(e, best))?
             }
         };
         let single = self.get(&TermSet::of(&with_noise.terms[..1]))?;
@@ -285,10 +285,15 @@ impl Explanations {
     }
 }
 
-/// Returns whether the last term of an explanation is outliers at another sensor than that of an effect.
-pub(super) fn are_outliers_elsewhere(noise: &Explanation, effect: &Explanation) -> bool {
+/// Returns whether the last term of an explanation is noise that a correction does not imitate: outliers at another sensor than that of an
+/// effect, or noise that grows with the signal.
+pub(super) fn is_noise_apart(noise: &Explanation, effect: &Explanation) -> bool {
     let is_at = effect.last().target == noise.last().target;
-    matches!(noise.last().part, Part::Effect { .. }) && !is_at
+    match noise.last().part {
+        Part::Effect { .. } => !is_at,
+        Part::Share { .. } => true,
+        Part::Disturbance { .. } | Part::Function(_) => false,
+    }
 }
 
 /// Best first.

@@ -41,7 +41,7 @@ impl RecordFit {
             draws: options.draws,
             ..FitSettings::default()
         };
-        let fit = match study.fit_with(std::slice::from_ref(record), &settings, progress) {
+        let fit = match study.fit_asking(false, std::slice::from_ref(record), &settings, progress) {
             Ok(fit) => fit,
             Err(error @ StudyError::Cancelled(_)) => return Err(error.into()),
             // The estimate stands on features, which may exist where the likelihood does not.

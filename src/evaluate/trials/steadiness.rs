@@ -6,9 +6,8 @@ use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::progress::Progress;
 use crate::record::Record;
-use crate::study::{Study, StudyFile};
+use crate::study::{NoiseTable, Study, StudyFile};
 use crate::twin::{NoiseLevel, Outline, TwinPart};
-use std::collections::BTreeMap;
 
 /// Answers under other seeds, from a record twice as long, in other units, and with the library in another order.
 pub(super) fn repeats(
@@ -96,7 +95,7 @@ pub(super) fn rescaled(
 }
 
 /// Returns the declared noise levels in the new units; `None` where one is to be estimated, and so is a parameter in the old ones.
-fn noise(file: &StudyFile, outline: &Outline) -> Option<BTreeMap<String, NoiseLevel>> {
+fn noise(file: &StudyFile, outline: &Outline) -> Option<NoiseTable> {
     let scaled = |(name, level): (&String, &NoiseLevel)| {
         let is_output = outline.outputs.iter().any(|output| output.name == *name);
         let mut level = *level;
@@ -106,7 +105,16 @@ fn noise(file: &StudyFile, outline: &Outline) -> Option<BTreeMap<String, NoiseLe
         declared.std *= if is_output { FACTOR } else { 1.0 };
         Some((name.clone(), level))
     };
-    file.noise.iter().map(scaled).collect()
+    let levels = file
+        .noise
+        .levels
+        .iter()
+        .map(scaled)
+        .collect::<Option<_>>()?;
+    Some(NoiseTable {
+        levels,
+        ..file.noise.clone()
+    })
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Search for what a model lacks: all hypotheses are screened, the promising ones refitted.
 
+pub(crate) mod asked;
 mod breadth;
 pub(crate) mod effects;
 pub(crate) mod explanation;

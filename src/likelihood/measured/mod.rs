@@ -13,11 +13,13 @@
 
 mod level;
 mod motion;
+mod share;
 mod start;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use level::{Beliefs, Level, Measured, StartElsewhere};
+pub(crate) use share::{LARGEST_SHARE, share_name, with_share};
 
 use super::ensemble;
 use super::kalman::FilterError;

@@ -63,6 +63,10 @@ fn evidence(diagnosis: &Diagnosis) -> String {
     };
     let correlated = diagnosis.correlated_noise.join(" and ");
     let outliers = diagnosis.outliers.join(" and ");
+    let proportional = match diagnosis.proportional_noise.join(" and ") {
+        none if none.is_empty() => none,
+        places => format!(" The noise grows with the signal at {places}."),
+    };
     let noise = match (correlated.is_empty(), outliers.is_empty()) {
         (true, true) => String::new(),
         (true, false) => format!(" The noise has outliers at {outliers}."),
@@ -77,7 +81,7 @@ fn evidence(diagnosis: &Diagnosis) -> String {
         }
     };
     format!(
-        "Evidence for a gap: {} nats (called above 3); probability that nothing is missing: {}{calibrated}.{noise}",
+        "Evidence for a gap: {} nats (called above 3); probability that nothing is missing: {}{calibrated}.{noise}{proportional}",
         short(diagnosis.detection.log_evidence),
         chance(diagnosis.cause.probabilities.nothing)
     )

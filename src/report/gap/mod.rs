@@ -46,7 +46,7 @@ pub const NEXT_INPUT: &str = "next-input.csv";
 /// | `which` | effects with probabilities, the accepted ones first, and those that do the same in this twin (`also`); rivals, what remains, the next input |
 /// | `shrinkage` | prediction errors on held-out data over several horizons, the share closed, controls |
 /// | `discovery` | exploratory law of the missing function |
-/// | `correlated_noise`, `outliers`, `integrator`, `substeps` | noise and step that the diagnosis used in place of the twin's |
+/// | `correlated_noise`, `proportional_noise`, `outliers`, `integrator`, `substeps` | noise and step that the diagnosis used in place of the twin's |
 /// | `power`, `not_tested`, `candidates` | smallest detectable magnitudes; effects left out; explanations tested |
 /// | `warnings` | `code`, `what`, `remedy` of everything that makes the result doubtful |
 /// | `quick`, `interrupted`, `seconds` | extent of the search |

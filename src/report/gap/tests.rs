@@ -483,6 +483,10 @@ fn every_part_of_the_answer_has_its_place() {
     let mut outliers = made::tanks_class();
     outliers.outliers = vec!["sensor".into()];
     assert!(text(&tanks(), &outliers).contains("The noise has outliers at sensor."));
+    let mut proportional = made::tanks_class();
+    proportional.proportional_noise = vec!["sensor".into()];
+    let told = "The noise grows with the signal at sensor.";
+    assert!(text(&tanks(), &proportional).contains(told));
     let no_gap = page(&oscillator(), &made::oscillator_no_gap());
     let at = |id: &str| no_gap.find(&format!("<section id=\"{id}"));
     assert!(

@@ -19,6 +19,9 @@ pub(crate) enum NoiseLevel {
 pub(crate) struct DeclaredNoise {
     /// Standard deviation; 0 declares nothing.
     pub std: f64,
+    /// Share of an output's size |y| that is added to `std`.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub share: f64,
     /// `true` if nothing is to be fitted.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub known: bool,
@@ -36,6 +39,10 @@ fn usual_factor() -> f64 {
     std::f64::consts::E
 }
 
+fn is_none(share: &f64) -> bool {
+    *share == 0.0
+}
+
 fn is_usual_factor(factor: &f64) -> bool {
     *factor == usual_factor()
 }
@@ -51,20 +58,45 @@ pub(crate) enum Per {
     Second,
 }
 
+impl DeclaredNoise {
+    /// A level that is not fitted, a state's per step.
+    pub(crate) fn known(std: f64) -> Self {
+        Self {
+            std,
+            share: 0.0,
+            known: true,
+            factor: usual_factor(),
+            per: Per::Step,
+        }
+    }
+}
+
 impl NoiseLevel {
+    /// Returns whether the level says of itself that it is to be found.
+    pub(crate) fn is_open(&self) -> bool {
+        match self {
+            Self::Declared(level) => !level.known && !is_usual_factor(&level.factor),
+            Self::Estimate => true,
+        }
+    }
+
     /// A declared level, a state's per step.
     pub(crate) fn declared(std: f64) -> Self {
         Self::Declared(DeclaredNoise {
             std,
+            share: 0.0,
             known: false,
             factor: usual_factor(),
             per: Per::Step,
         })
     }
 
-    /// Checks numbers of the level of `name`.
-    pub(super) fn check(self, name: &str) -> Result<(), TwinError> {
-        let Self::Declared(DeclaredNoise { std, factor, .. }) = self else {
+    /// Checks numbers of the level of `name`, a state or an output.
+    pub(super) fn check(self, name: &str, is_process: bool) -> Result<(), TwinError> {
+        let Self::Declared(DeclaredNoise {
+            std, share, factor, ..
+        }) = self
+        else {
             return Ok(());
         };
         let wrong = |value, remedy| TwinError::Value {
@@ -75,6 +107,17 @@ impl NoiseLevel {
         };
         if !(std >= 0.0 && std.is_finite()) {
             return Err(wrong(std, "a standard deviation is 0 or more"));
+        }
+        if !(0.0..1.0).contains(&share) {
+            return Err(wrong(
+                share,
+                "a share of the signal lies in [0, 1), such as 0.05",
+            ));
+        }
+        if is_process && share > 0.0 {
+            let remedy =
+                "a share is that of an output's noise in its signal; give a state std alone";
+            return Err(wrong(share, remedy));
         }
         if !(factor > 1.0 && factor.is_finite()) {
             let remedy = "factor is how many times larger or smaller the level may well be: above 1, such as 2";
@@ -87,7 +130,7 @@ impl NoiseLevel {
 #[derive(Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "expected a number, { std = .., known = true, factor = 2.0, per = \"step\" or \"second\" }, or \"estimate\""
+    expecting = "expected a number, { std = .., share = .., known = true, factor = 2.0, per = \"step\" or \"second\" }, or \"estimate\""
 )]
 enum NoiseText {
     Number(f64),
@@ -258,6 +301,7 @@ mod tests {
             "[h]\nstd = 0.1\nknown = true\nper = \"second\"\n\n[x]\nmean = 2.0\nstd = 0.5\n",
             "h = 0.1\n\n[x]\nvalue = 2.0\nat = -1.5\n",
             "h = 0.1\n\n[x]\nmean = 2.0\nstd = 0.5\nat = 0.0\n",
+            "[h]\nstd = 0.1\nshare = 0.05\nper = \"step\"\n\n[x]\nmean = 2.0\nstd = 0.5\n",
         ] {
             let file: File = toml::from_str(text).unwrap();
             assert_eq!(toml::to_string(&file).unwrap(), text);
@@ -268,14 +312,22 @@ mod tests {
 
     #[test]
     fn numbers_that_cannot_be_used_are_named() {
-        let factor = NoiseLevel::Declared(DeclaredNoise {
-            std: 0.1,
-            known: false,
-            factor: 0.5,
-            per: Per::Step,
-        });
-        for (level, value) in [(NoiseLevel::declared(-0.1), "-0.1"), (factor, "0.5")] {
-            let error = level.check("h1").unwrap_err().to_string();
+        let of = |share, factor| {
+            NoiseLevel::Declared(DeclaredNoise {
+                std: 0.1,
+                share,
+                known: false,
+                factor,
+                per: Per::Step,
+            })
+        };
+        for (level, value) in [
+            (NoiseLevel::declared(-0.1), "-0.1"),
+            (of(0.0, 0.5), "0.5"),
+            (of(-0.2, 2.0), "-0.2"),
+            (of(0.05, 2.0), "a state"),
+        ] {
+            let error = level.check("h1", true).unwrap_err().to_string();
             assert!(error.contains(value), "{error}");
         }
     }

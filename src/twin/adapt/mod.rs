@@ -97,8 +97,8 @@ fn adapt_equations(
     let noise = indexed("noise", &adaptation.noise, &noisy)?;
     let levels = declared_noise(base, &outline, step);
     for &(index, name, level) in &noise {
-        level.check(name)?;
         let is_process = index < states.len();
+        level.check(name, is_process)?;
         let setting = match level {
             NoiseLevel::Declared(DeclaredNoise { std, per, .. }) => LevelValue::Known(match per {
                 Per::Second if is_process => std * step.sqrt(),
@@ -121,6 +121,14 @@ fn adapt_equations(
             level: setting,
             step,
         });
+        if let NoiseLevel::Declared(DeclaredNoise { share, .. }) = level
+            && share > 0.0
+        {
+            parts.push(TwinPart::Share {
+                output: index - states.len(),
+                share: LevelValue::Known(share),
+            });
+        }
     }
     let mut begins: Option<f64> = None;
     for (state, name, level) in indexed("start", &adaptation.start, &states)? {

@@ -2,6 +2,7 @@
 
 use super::{Composed, Disturbance, FittedLevels, Law, LevelSource, TwinPart};
 use crate::twin::Now;
+use smallvec::SmallVec;
 
 impl Composed {
     /// Sets the standard deviations of the increment of each state in a step, and of each output, at the states `x`; both come zeroed.
@@ -44,6 +45,15 @@ impl Composed {
                         }
                     }
                     TwinPart::Levels(levels) => levels.set(now, process, measurement),
+                    TwinPart::Share { output, share } => {
+                        let share = share.value(now.theta);
+                        if share != 0.0 {
+                            let mut y: SmallVec<[f64; 4]> =
+                                SmallVec::from_elem(0.0, measurement.len());
+                            self.observe(now, x, &mut y);
+                            measurement[*output] += share * y[*output].abs();
+                        }
+                    }
                     TwinPart::Late(_) => {
                         if let Some(share) = parts.moving(now, added.delays) {
                             process.iter_mut().for_each(|q| *q *= share.sqrt());

@@ -277,6 +277,8 @@ pub(crate) enum TwinPart {
     },
     /// Noise levels that a record fits.
     Levels(FittedLevels),
+    /// Noise of an output that grows with its signal: |y| times this share is added to its level.
+    Share { output: usize, share: LevelValue },
     /// Values of held parameters, from this entry of θ on: each run draws one list of them.
     Drawn { first: usize, values: Vec<Vec<f64>> },
     /// Noise of the sensors of a black box.

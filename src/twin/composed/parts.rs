@@ -80,7 +80,9 @@ impl Acts {
             TwinPart::Unit(_) => {
                 (self.on_outputs, self.on_noise, self.on_readings) = (true, true, true);
             }
-            TwinPart::Level { .. } | TwinPart::Levels(_) => self.on_noise = true,
+            TwinPart::Level { .. } | TwinPart::Levels(_) | TwinPart::Share { .. } => {
+                self.on_noise = true;
+            }
             TwinPart::Start { .. } | TwinPart::UncertainStart { .. } => self.on_start = true,
             TwinPart::Disturbance(part) => {
                 (self.in_disturbances, self.on_noise, self.on_start) = (true, true, true);
