@@ -45,10 +45,10 @@ mod true_effects;
 pub(crate) use greedy::greedy;
 pub(crate) use outcome::Cell;
 pub use outcome::{
-    Band, Burst, Cause, Channel, Decision, Detection, Diagnosis, Discovery, Disturbance, EffectFit,
-    FittedParameter, FreeRuns, Horizon, Lag, Location, Maps, MissingFunction, NextInput, Onset,
-    Predicted, PredictiveCheck, Probabilities, Region, Remains, Shrinkage, TargetShare, Term,
-    Verdict, Visible, Window,
+    Band, Burst, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit,
+    FittedParameter, FreeRuns, HiddenDisturbance, Horizon, Lag, Location, Maps, MissingFunction,
+    NextInput, Onset, Predicted, PredictiveCheck, Probabilities, Region, Remains, Shrinkage,
+    TargetShare, Term, Verdict, Visible, Window,
 };
 pub(crate) use quantify::share::SHORTEST_SPLIT;
 pub use run::diagnose;

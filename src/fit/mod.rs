@@ -8,7 +8,7 @@
 //! | `score.rs` | how well a fit predicts a record that it has not seen |
 //! | `follow.rs` | how the fitted twin follows its records |
 //! | `budget.rs` | cost and tolerances of a fit, and the count of its passes |
-//! | `starts.rs`, `spectral.rs`, `growing.rs` | where does a search begin |
+//! | `starts/` | where does a search begin |
 //! | `solver.rs` | the one solver, on argmin |
 //! | `climb.rs`, `kinks.rs` | the most probable θ, also where the likelihood has kinks |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
@@ -26,7 +26,6 @@ pub(crate) mod climb;
 pub(crate) mod doubts;
 pub(crate) mod evidence;
 pub(crate) mod follow;
-pub(crate) mod growing;
 mod hold;
 mod kinks;
 pub(crate) mod least_squares;
@@ -38,7 +37,6 @@ mod run;
 mod score;
 mod searched;
 mod solver;
-mod spectral;
 pub(crate) mod starts;
 
 pub(crate) use budget::{ITERATIONS, Passes};
@@ -54,4 +52,4 @@ pub(crate) use run::{Subject, run};
 pub use score::FitScore;
 pub(crate) use score::score;
 pub(crate) use searched::{Searched, fits};
-pub(crate) use spectral::spectral_starts;
+pub(crate) use starts::spectral_starts;

@@ -2,10 +2,10 @@
 
 use super::budget::ITERATIONS;
 use super::climb::Fitted;
-use super::growing::base_fit;
 use super::kinks::over_kinks;
 use super::problem::Problem;
-use super::spectral::spectral_starts;
+use super::starts::growing::base_fit;
+use super::starts::spectral_starts;
 use super::starts::{Care, polish, search};
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;

@@ -1,11 +1,11 @@
 //! The handle by which every stage holds a twin.
 
-use super::composed::{FREE_RUNS, Parts, check_start};
+use super::composed::{Entry, FREE_RUNS, Parts, check_start};
 use super::definitions::defined_states;
 use crate::record::{Drive, RecordError, Signal, Signals};
 use crate::twin::{
-    Composed, ComposedBlackBox, DigitalTwin, Integrator, KnownNoise, Noise, Outline, Parameter,
-    ParameterSpace, SimulationError, Stepping, TwinError, TwinPart,
+    Composed, ComposedBlackBox, DigitalTwin, Integrator, KnownNoise, Noise, Now, Outline,
+    Parameter, ParameterSpace, SimulationError, Stepping, TwinError, TwinPart,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -135,6 +135,24 @@ impl Twin {
             Self::Equations(twin) => defined_states(twin),
             Self::BlackBox(_) => vec![],
         }
+    }
+
+    /// Correlated disturbances: where each enters, the index of its state, the entry of its size in θ; none of a black box.
+    pub(crate) fn disturbances(&self) -> Vec<(Entry, usize, usize)> {
+        self.equations().map_or(vec![], Composed::disturbances)
+    }
+
+    /// Noise levels at the first row of a drive and its start: process, an increment a step, and measurement; none of a black box.
+    pub(crate) fn first_noise(&self, theta: &[f64], drive: &Drive) -> Option<[Vec<f64>; 2]> {
+        let twin = self.equations()?;
+        let outline = twin.outline();
+        let now = Now::new(drive.time(0), drive.step(0), drive.input(0), theta);
+        let mut start = vec![0.0; outline.states.len()];
+        twin.start(&now, &mut start);
+        let mut process = vec![0.0; outline.states.len()];
+        let mut measurement = vec![0.0; outline.outputs.len()];
+        twin.noise(&now, &start, &mut process, &mut measurement);
+        Some([process, measurement])
     }
 
     /// Integrator and stepping; `None` for a black box.

@@ -9,7 +9,7 @@ pub use location::{
     Band, Channel, Lag, Location, Maps, MissingFunction, Onset, Region, TargetShare, Window,
 };
 
-pub use predictive::{Burst, Disturbance, Predicted, PredictiveCheck};
+pub use predictive::{Burst, HiddenDisturbance, Predicted, PredictiveCheck};
 pub(in crate::diagnose) use warnings::warnings;
 
 use crate::fit::{Nuisance, Warning};
@@ -331,6 +331,13 @@ pub struct Diagnosis {
     /// Free runs beside the validation record.
     #[serde(skip)]
     pub validation_runs: Option<FreeRuns>,
+}
+
+impl Diagnosis {
+    /// The disturbance that fitted noise had swallowed, if any.
+    pub fn disturbance(&self) -> Option<&HiddenDisturbance> {
+        self.check.as_ref()?.disturbance.as_ref()
+    }
 }
 
 /// Prediction errors over one horizon, on held-out data: root mean squares over the standard deviation of the output.

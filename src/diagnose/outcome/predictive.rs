@@ -16,8 +16,8 @@ pub struct PredictiveCheck {
     /// Each statistic.
     #[serde(rename = "statistics")]
     pub rows: Vec<Predicted>,
-    /// What the fitted noise swallows, where the records do not look like simulated ones.
-    pub disturbance: Option<Disturbance>,
+    /// The disturbance that fitted noise swallows, where the records do not look like simulated ones.
+    pub disturbance: Option<HiddenDisturbance>,
 }
 
 impl PredictiveCheck {
@@ -70,14 +70,14 @@ pub struct Predicted {
     pub expected: [f64; 2],
     /// Distance from the mean of simulated records, in their standard deviations.
     pub deviations: f64,
-    /// How far that counts against the twin.
+    /// The distance as far as it counts against the twin.
     #[serde(skip)]
     pub(in crate::diagnose) departure: f64,
 }
 
 /// Noise that is none: it is larger, in windows of some length, than noise as declared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Disturbance {
+pub struct HiddenDisturbance {
     /// A state, or a sensor.
     pub place: String,
     /// Unit of the disturbance: that of the state per second, or of the output.

@@ -13,7 +13,7 @@
 //! simulated records have anywhere, of the clearest length with which they are half of the record at most.
 
 use super::{Predictive, Replicate};
-use crate::diagnose::outcome::{Burst, Disturbance, TargetShare};
+use crate::diagnose::outcome::{Burst, HiddenDisturbance, TargetShare};
 use crate::diagnose::quantify::free_run::mean;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
@@ -22,12 +22,12 @@ use crate::likelihood::kalman::FilterError;
 use crate::math::{deviation, quantile};
 use crate::record::Record;
 use crate::study::StudyError;
-use crate::twin::{Entry, Role, Twin};
+use crate::twin::{Entry, Role};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// A place that may be disturbed.
-struct Place {
+struct NoisyPlace {
     name: String,
     unit: String,
     entry: Entry,
@@ -35,7 +35,7 @@ struct Place {
     memories: Vec<usize>,
 }
 
-/// Disturbance at one place, by record and sample.
+/// HiddenDisturbance at one place, by record and sample.
 type Course = Vec<Vec<f64>>;
 
 /// Windows of a scan: their length in samples, and what is summed.
@@ -45,7 +45,7 @@ struct Scan {
     is_push: bool,
 }
 
-/// How clear the disturbance of a place is, and in which windows.
+/// Clearness of the disturbance of a place, and the windows in which it is clear.
 struct Clearest {
     score: f64,
     /// Windows of each length and kind, clearest first, and what 95 % of simulated records do not reach in any.
@@ -56,7 +56,7 @@ struct Clearest {
 
 impl Predictive<'_> {
     /// The disturbance, and the probability of each place; `None` where no place has fitted noise.
-    pub fn disturbance(&self) -> Result<Option<(Disturbance, Vec<TargetShare>)>, StudyError> {
+    pub fn disturbance(&self) -> Result<Option<(HiddenDisturbance, Vec<TargetShare>)>, StudyError> {
         let problem = &self.model.problem;
         let places = places(problem);
         let fitted = &self.model.fitted.theta;
@@ -89,7 +89,7 @@ impl Predictive<'_> {
             .collect();
         let (place, clear, record) = (&places[first], &clear[first], &problem.records[0]);
         let drive = record.drive();
-        let disturbance = Disturbance {
+        let disturbance = HiddenDisturbance {
             place: place.name.clone(),
             unit: place.unit.clone(),
             size: clear.size,
@@ -113,11 +113,12 @@ impl Predictive<'_> {
 }
 
 /// States whose noise level is fitted, and sensors with correlated noise.
-fn places(problem: &Problem) -> Vec<Place> {
-    let Twin::Equations(twin) = &problem.twin else {
+fn places(problem: &Problem) -> Vec<NoisyPlace> {
+    let twin = &problem.twin;
+    let Some(outline) = twin.outline() else {
         return vec![];
     };
-    let (outline, disturbances) = (twin.outline(), twin.disturbances());
+    let disturbances = twin.disturbances();
     let memories = |entry: Entry| -> Vec<usize> {
         let own = disturbances.iter().filter(|(at, ..)| *at == entry);
         own.map(|(_, state, _)| *state).collect()
@@ -132,7 +133,7 @@ fn places(problem: &Problem) -> Vec<Place> {
             };
             let (name, entry) = (state.name.clone(), Entry::State(i));
             let memories = memories(entry);
-            all.push(Place {
+            all.push(NoisyPlace {
                 name,
                 unit,
                 entry,
@@ -145,7 +146,7 @@ fn places(problem: &Problem) -> Vec<Place> {
         let (name, unit, entry) = (sensors[j].clone(), output.unit.clone(), Entry::Sensor(j));
         let memories = memories(entry);
         if !memories.is_empty() {
-            all.push(Place {
+            all.push(NoisyPlace {
                 name,
                 unit,
                 entry,
@@ -161,11 +162,11 @@ fn courses(
     problem: &Problem,
     theta: &[f64],
     records: &[Record],
-    places: &[Place],
+    places: &[NoisyPlace],
 ) -> Result<Vec<Course>, FilterError> {
     let problem = problem.on(records);
     let (steps, states) = (problem.disturbances(theta)?, problem.smoothed(theta)?);
-    let at = |place: &Place, r: usize, k: usize| {
+    let at = |place: &NoisyPlace, r: usize, k: usize| {
         let memories = place.memories.iter().map(|&i| states[r].means[[k, i]]);
         let memory: f64 = memories.sum();
         match place.entry {
@@ -173,11 +174,11 @@ fn courses(
             _ => memory,
         }
     };
-    let of_record = |place: &Place, r: usize| -> Vec<f64> {
+    let of_record = |place: &NoisyPlace, r: usize| -> Vec<f64> {
         let rows = 0..records[r].samples() - 1;
         rows.map(|k| at(place, r, k)).collect()
     };
-    let course = |place: &Place| (0..records.len()).map(|r| of_record(place, r)).collect();
+    let course = |place: &NoisyPlace| (0..records.len()).map(|r| of_record(place, r)).collect();
     Ok(places.iter().map(course).collect())
 }
 

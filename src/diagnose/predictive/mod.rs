@@ -31,7 +31,7 @@ use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::Noise;
 use rayon::prelude::*;
-use statistics::{Look, Statistic};
+use statistics::{Discrepancy, Look};
 use std::ops::Range;
 
 /// A twin at one draw, and records that it simulates there.
@@ -57,7 +57,7 @@ impl Predictive<'_> {
         if problem.is_simulated() || self.draws.thetas.is_empty() {
             return Ok(None);
         }
-        let statistics = Statistic::all(problem, self.correlated().is_empty());
+        let statistics = Discrepancy::all(problem, self.correlated().is_empty());
         let measured = self.measured(&statistics)?;
         let mut simulated: Vec<Look> = vec![];
         let mut compared = None;
@@ -81,7 +81,7 @@ impl Predictive<'_> {
     }
 
     /// The statistics of the measured records: means over draws.
-    fn measured(&self, statistics: &[Statistic]) -> Result<Look, StudyError> {
+    fn measured(&self, statistics: &[Discrepancy]) -> Result<Look, StudyError> {
         let problem = &self.model.problem;
         let draws = self
             .draws
@@ -135,7 +135,7 @@ impl Predictive<'_> {
 fn looks(
     problem: &Problem,
     replicates: &[Replicate],
-    statistics: &[Statistic],
+    statistics: &[Discrepancy],
 ) -> Result<Vec<Look>, StudyError> {
     let all: Vec<Option<Look>> = (replicates.par_iter())
         .map(|one| statistics::look(problem, &one.records, &one.theta, statistics))
@@ -144,7 +144,7 @@ fn looks(
 }
 
 /// Compares statistics of the measured records with those of simulated ones.
-fn compare(statistics: &[Statistic], measured: &Look, simulated: &[Look]) -> PredictiveCheck {
+fn compare(statistics: &[Discrepancy], measured: &Look, simulated: &[Look]) -> PredictiveCheck {
     // A value that is not finite is of a statistic that has no meaning here (readings that never move).
     let usable: Vec<usize> = (0..statistics.len())
         .filter(|&s| measured[s].is_finite() && simulated.iter().all(|look| look[s].is_finite()))

@@ -1,26 +1,23 @@
 //! The fitted twin with noise as declared, beside which fitted noise is judged.
 
-use super::statistics::{Look, Statistic};
+use super::statistics::{Discrepancy, Look};
 use super::{Predictive, looks};
 use crate::diagnose::quantify::free_run::mean;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::problem::Problem;
 use crate::study::StudyError;
-use crate::twin::{Now, Role, Twin};
+use crate::twin::{Role, Twin};
 
 /// States and outputs whose noise level a twin with equations declares, at the first row and θ of the prior's centre.
 pub(in crate::diagnose) fn declared(twin: &Twin, problem: &Problem) -> Vec<String> {
-    let Twin::Equations(twin) = twin else {
+    let drive = problem.records[0].drive();
+    let Some(outline) = twin.outline() else {
         return vec![];
     };
-    let (outline, drive) = (twin.outline(), problem.records[0].drive());
     let theta = outline.parameters.centre();
-    let now = Now::new(drive.time(0), drive.dt(), drive.input(0), &theta);
-    let mut start = vec![0.0; outline.states.len()];
-    twin.start(&now, &mut start);
-    let mut process = vec![0.0; outline.states.len()];
-    let mut measurement = vec![0.0; outline.outputs.len()];
-    twin.noise(&now, &start, &mut process, &mut measurement);
+    let Some([process, measurement]) = twin.first_noise(&theta, drive) else {
+        return vec![];
+    };
     let all = outline.states.iter().chain(&outline.outputs);
     (all.zip(process.iter().chain(&measurement)))
         .filter(|(_, level)| **level > 0.0)
@@ -53,23 +50,21 @@ impl Predictive<'_> {
 
     /// Entries of the sizes of correlated noise.
     pub(super) fn correlated(&self) -> Vec<usize> {
-        match &self.model.problem.twin {
-            Twin::Equations(twin) => twin.disturbances().iter().map(|(.., size)| *size).collect(),
-            Twin::BlackBox(_) => vec![],
-        }
+        let all = self.model.problem.twin.disturbances();
+        all.iter().map(|(.., size)| *size).collect()
     }
 
     /// Share of the output's variance that noise beyond the reference puts into predictions as far ahead as windows of the record reach.
     pub(super) fn noise_share(
         &self,
-        statistics: &[Statistic],
+        statistics: &[Discrepancy],
         simulated: &[Look],
     ) -> Result<Option<f64>, StudyError> {
         let (theta, is_other) = self.reference();
         if !is_other {
             return Ok(None);
         }
-        let Some(at) = statistics.iter().rposition(Statistic::is_window) else {
+        let Some(at) = statistics.iter().rposition(Discrepancy::is_window) else {
             return Ok(None);
         };
         let replicates = self.replicates(0..Thresholds::CHECK_FIRST, |_| &theta)?;

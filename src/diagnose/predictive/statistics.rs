@@ -8,7 +8,7 @@ use crate::likelihood::kalman::recoverable;
 use crate::record::Record;
 use crate::study::StudyError;
 
-/// Statistic of records at θ; v are standardised innovations of one output, n of them.
+/// Discrepancy of records at θ; v are standardised innovations of one output, n of them.
 ///
 /// | statistic | value |
 /// |---|---|
@@ -18,7 +18,7 @@ use crate::study::StudyError;
 /// | bursts | ln Σ n·ρ_l² of v² over twenty lags |
 /// | error | ln mean square of predictions so far ahead, over the variance of the output |
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Statistic {
+pub(super) enum Discrepancy {
     Spread(String),
     /// It counts where the fit claims that all noise is white: of correlated noise a fit knows a few correlations alone.
     Whiteness {
@@ -33,7 +33,7 @@ pub(super) enum Statistic {
 /// Values of all statistics; NaN where one has no meaning.
 pub(super) type Look = Vec<f64>;
 
-impl Statistic {
+impl Discrepancy {
     /// All that are looked at.
     pub fn all(problem: &Problem, is_white: bool) -> Vec<Self> {
         let outputs = problem.outline().outputs.into_iter();
@@ -117,7 +117,7 @@ pub(super) fn look(
     problem: &Problem,
     records: &[Record],
     theta: &[f64],
-    statistics: &[Statistic],
+    statistics: &[Discrepancy],
 ) -> Result<Option<Look>, StudyError> {
     let Some(filtered) = recoverable(problem.on(records).filtered(theta))? else {
         return Ok(None);
@@ -151,16 +151,16 @@ pub(super) fn look(
             })
             .collect()
     };
-    let value = |statistic: &Statistic| -> Result<f64, StudyError> {
+    let value = |statistic: &Discrepancy| -> Result<f64, StudyError> {
         Ok(match statistic {
-            Statistic::Spread(output) => mean_power(&series(output), 2).ln(),
-            Statistic::Whiteness { output, .. } => correlation(&series(output)).ln(),
-            Statistic::Tails(output) => {
+            Discrepancy::Spread(output) => mean_power(&series(output), 2).ln(),
+            Discrepancy::Whiteness { output, .. } => correlation(&series(output)).ln(),
+            Discrepancy::Tails(output) => {
                 let series = series(output);
                 (mean_power(&series, 4) / mean_power(&series, 2).powi(2)).ln()
             }
-            Statistic::Bursts(output) => correlation(&squared(&series(output))).ln(),
-            Statistic::Error(reach, _) => {
+            Discrepancy::Bursts(output) => correlation(&squared(&series(output))).ln(),
+            Discrepancy::Error(reach, _) => {
                 let (mut sum, mut count) = (0.0, 0);
                 for ((predictor, record), own) in
                     predictors.iter().zip(records).zip(problem.records.iter())

@@ -1,7 +1,7 @@
 //! Predictive check of an all-clear in words, and the disturbance that noise had swallowed.
 
 use super::pictures;
-use crate::diagnose::{Diagnosis, Disturbance, Predicted, PredictiveCheck};
+use crate::diagnose::{Diagnosis, HiddenDisturbance, Predicted, PredictiveCheck};
 use crate::report::digits::{chance, percent, short, with_unit};
 use crate::report::document::Block;
 use crate::report::document::Column::{Number, Text};
@@ -44,7 +44,7 @@ fn departure(row: &Predicted) -> String {
 
 /// The disturbance of a record that the check refused: words, then a picture.
 pub(super) fn disturbance(units: &Units, diagnosis: &Diagnosis) -> Vec<Block> {
-    let Some(disturbance) = swallowed(diagnosis) else {
+    let Some(disturbance) = diagnosis.disturbance() else {
         return vec![];
     };
     let mut blocks = vec![
@@ -58,12 +58,7 @@ pub(super) fn disturbance(units: &Units, diagnosis: &Diagnosis) -> Vec<Block> {
     blocks
 }
 
-/// The disturbance that fitted noise had swallowed, if any.
-pub(super) fn swallowed(diagnosis: &Diagnosis) -> Option<&Disturbance> {
-    diagnosis.check.as_ref()?.disturbance.as_ref()
-}
-
-fn words(units: &Units, disturbance: &Disturbance) -> String {
+fn words(units: &Units, disturbance: &HiddenDisturbance) -> String {
     let place = units.in_words(&disturbance.place);
     let mut text = format!("The noise that the fit gives {place} hides a disturbance");
     text += &format!(

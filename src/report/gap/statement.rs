@@ -1,6 +1,5 @@
 //! The answer in words: headline, what follows from it, what to do next. All of it follows from verdict, decision and probabilities.
 
-use super::check::swallowed;
 use super::share::share_with_interval;
 use super::words::{MOST_NAMES, effect, effects, few, joined};
 use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, Verdict};
@@ -115,7 +114,7 @@ fn unnamed(units: &Units, diagnosis: &Diagnosis) -> String {
     let kinds = &diagnosis.cause.probabilities;
     let gap = gap(diagnosis);
     let (what, at) = match kinds.unknown >= kinds.listed + kinds.partial {
-        _ if swallowed(diagnosis).is_some() => (
+        _ if diagnosis.disturbance().is_some() => (
             format!("{gap} that fitted noise hides: no listed effect explains it"),
             "a disturbance acts on",
         ),

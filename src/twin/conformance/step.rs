@@ -3,7 +3,7 @@
 use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
 use crate::record::{Drive, Signal};
-use crate::twin::{Composed, MOST_SUBSTEPS, Noise, Now, SimulationError, Twin};
+use crate::twin::{Composed, MOST_SUBSTEPS, Noise, SimulationError, Twin};
 
 /// Largest error of the step where no noise is declared, as a share of an output's deviation.
 const STEP_SHARE: f64 = 0.01;
@@ -73,13 +73,8 @@ fn step_levels(
     theta: &[f64],
     drive: &Drive,
 ) -> Result<Vec<(f64, &'static str)>, SimulationError> {
-    let outline = twin.outline();
-    let mut process = vec![0.0; outline.states.len()];
-    let mut measurement = vec![0.0; outline.outputs.len()];
-    let now = Now::new(0.0, drive.step(0), drive.input(0), theta);
-    let mut start = vec![0.0; outline.states.len()];
-    twin.start(&now, &mut start);
-    twin.noise(&now, &start, &mut process, &mut measurement);
+    let [_, measurement] =
+        (Twin::Equations(twin.clone()).first_noise(theta, drive)).unwrap_or_default();
     let run = twin.run(theta, drive, Noise::OFF)?;
     let scatter = scatter(twin, theta, drive, &run)?;
     let levels = measurement.iter().zip(scatter).zip(run.columns());

@@ -5,7 +5,6 @@ use crate::report::chart::{
     Area, HeatGroup, HeatRow, Line, Panel, Span, Style, TimeMark, chart, heat_map,
 };
 use crate::report::digits::{in_unit, named, percent, short};
-use crate::report::gap::check::swallowed;
 use crate::report::gap::statement::accepted_ids;
 use crate::report::record::{RecordPicture, Run};
 use crate::report::units::Units;
@@ -148,7 +147,7 @@ pub fn runs(study: &Study, diagnosis: &Diagnosis, validation: bool) -> Option<St
 
 /// The disturbance that fitted noise hides, with its bursts; `None` where there is none.
 pub fn disturbance(diagnosis: &Diagnosis) -> Option<String> {
-    let disturbance = swallowed(diagnosis)?;
+    let disturbance = diagnosis.disturbance()?;
     let spans = (disturbance.bursts.iter())
         .map(|burst| Span {
             from: burst.start,

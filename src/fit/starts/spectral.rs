@@ -8,7 +8,7 @@
 //! A likelihood has a narrow top at each frequency, and few points drawn over the bounds lie near the right one; the poles of a record are
 //! found without any search.
 
-use super::problem::Problem;
+use crate::fit::problem::Problem;
 use crate::record::Record;
 use crate::twin::{Acting, Noise, Twin};
 use nalgebra::{Complex, DMatrix, DVector};

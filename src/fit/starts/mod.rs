@@ -1,4 +1,10 @@
-//! Searches for the most probable θ, and where they begin.
+//! Searches for the most probable θ, and where they begin: from drawn points, at the poles of a record (`spectral`), and of black boxes
+//! (`growing`).
+
+pub(crate) mod growing;
+mod spectral;
+
+pub(crate) use spectral::spectral_starts;
 
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::{Fitted, climb};
