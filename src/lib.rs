@@ -54,6 +54,7 @@
 //! | task | module |
 //! |---|---|
 //! | write a simulator | [`twin`]: [`twin::StateSpace`], [`twin::DigitalTwin`] |
+//! | read a simulator's equations from a text | [`equations`] |
 //! | use a program in any language, or an FMU | [`external`] |
 //! | read and write records | [`record`] |
 //! | combine twin, record plan and effects | [`study`] |
@@ -111,6 +112,8 @@ pub mod record;
 
 pub mod twin;
 pub mod twins;
+
+pub mod equations;
 
 pub mod effect;
 

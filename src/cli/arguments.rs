@@ -12,6 +12,7 @@ use clap::{Arg, Command, CommandFactory, Parser};
     after_help = "A first look:   truetwin demo\n\
         The main job:   truetwin pretrain --twin tanks --out tanks.est\n                \
         truetwin estimate record.csv --estimator tanks.est --out result\n\
+        Your equations: truetwin new pendulum > pendulum.toml        (docs/equations.md)\n\
         Your simulator: truetwin check --program 'python3 model.py'   (docs/external-programs.md)\n\n\
         Records are CSV: t (seconds or time stamps), inputs u or u1,u2,…, outputs y or y1,y2,…; --columns for other names"
 )]

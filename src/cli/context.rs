@@ -71,6 +71,9 @@ impl Context<'_> {
     /// Returns the project of a study file.
     pub fn configured(&self, path: &Path) -> Result<Project, Failure> {
         let file = StudyFile::read(path)?;
+        if file.own_equations().is_some() {
+            return Ok(Study::of_file(&file).in_file(path)?.into());
+        }
         let project = self.named(&file.twin).in_file(path)?;
         project.configure(&file).in_file(path)
     }

@@ -4,19 +4,21 @@
 //! explains that noise, and passes for a gap. Of each input and output
 //!
 //! ```text
-//! u_k = a + b·u_{k−1} + c·ŷ_k + d·e_k        ŷ: prediction from the rows before, e = y − ŷ
+//! u_k = a + b·u_{k−1} + c·u_{k−2} + d·e_k + f·e_{k−1} + g·e_{k−2}        e: innovations of the output
 //! ```
 //!
-//! is fitted. A controller sees the output alone, whatever part of it was predicted: c and d are then alike, and both clear. An input that
-//! acts on a sensor by itself has d, but no c.
+//! is fitted. The input holds the noise where d is clear. That of a controller is told from one that acts on a sensor by itself by the
+//! innovations of rows before, which say nothing of the future of an input that nothing feeds back to: f or g must be clear as well.
 
 use crate::hypothesis::term::Term;
 use crate::likelihood::kalman::Filtered;
 use crate::record::Record;
 use nalgebra::{DMatrix, DVector};
 
-/// Standard errors from which c and d are clear: one record in 16 000 of an open loop has as large ones, of each.
+/// Standard errors from which d, and f or g, are clear: one record in 16 000 of an open loop has as large ones, of each.
 const CLEAR: f64 = 4.0;
+/// Rows before that are looked at.
+const BEFORE: usize = 2;
 
 /// Names of inputs that react to an output of the same row.
 pub(super) fn reacting(
@@ -37,31 +39,36 @@ fn responds(filtered: &[Filtered], records: &[Record], i: usize, j: usize) -> bo
     let (mut rows, mut inputs) = (vec![], vec![]);
     for (filtered, record) in filtered.iter().zip(records) {
         let u = record.drive().inputs().column(i);
-        for k in 1..record.samples() {
-            let (y, e) = (record.outputs()[[k, j]], filtered.innovations[[k, j]]);
-            if y.is_finite() {
-                rows.extend([1.0, u[k - 1], y - e, e]);
+        let e = filtered.innovations.column(j);
+        for k in BEFORE..record.samples() {
+            // A missing value has no innovation.
+            if (0..=BEFORE).all(|l| record.outputs()[[k - l, j]].is_finite()) {
+                rows.push(1.0);
+                rows.extend((1..=BEFORE).map(|l| u[k - l]));
+                rows.extend((0..=BEFORE).map(|l| e[k - l]));
                 inputs.push(u[k]);
             }
         }
     }
-    let [_, _, predicted, noise] =
-        match tested(DMatrix::from_row_iterator(inputs.len(), 4, rows), inputs) {
-            Some(all) => all,
-            None => return false,
-        };
-    predicted.abs().min(noise.abs()) > CLEAR && predicted * noise > 0.0
+    let columns = 2 * BEFORE + 2;
+    let x = DMatrix::from_row_iterator(inputs.len(), columns, rows);
+    let Some(t) = tested(&x, DVector::from_vec(inputs)) else {
+        return false;
+    };
+    let before = t.rows(columns - BEFORE, BEFORE).amax();
+    t[columns - BEFORE - 1].abs().min(before) > CLEAR
 }
 
 /// Coefficients of a linear regression over their standard errors; `None` where columns depend on each other.
-fn tested(x: DMatrix<f64>, y: Vec<f64>) -> Option<[f64; 4]> {
-    let y = DVector::from_vec(y);
-    let freedom = y.len().checked_sub(5)?.max(1) as f64;
-    let inverse = (x.transpose() * &x).cholesky()?.inverse();
+fn tested(x: &DMatrix<f64>, y: DVector<f64>) -> Option<DVector<f64>> {
+    let freedom = y.len().checked_sub(x.ncols() + 1)?.max(1) as f64;
+    let inverse = (x.transpose() * x).cholesky()?.inverse();
     let b = &inverse * x.transpose() * &y;
-    let variance = (&y - &x * &b).norm_squared() / freedom;
-    let t = |c: usize| b[c] / (variance * inverse[(c, c)]).sqrt().max(f64::MIN_POSITIVE);
-    Some([t(0), t(1), t(2), t(3)])
+    // An input that follows an output exactly leaves rounding errors.
+    let exact = (y.amax() * f64::EPSILON).powi(2);
+    let variance = ((&y - x * &b).norm_squared() / freedom).max(exact);
+    let t = |c: usize| b[c] / (variance * inverse[(c, c)]).sqrt();
+    Some(DVector::from_fn(x.ncols(), |c, _| t(c)))
 }
 
 /// Returns whether a term is a function of a reacting input at a sensor.

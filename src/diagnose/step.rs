@@ -22,7 +22,7 @@ impl OtherStep {
     /// Finer steps from the cheapest to the last, which stands for an exact one. A Runge–Kutta step takes four rates, and is given the time
     /// of four of Euler's; limits of states act once a substep, so that only more of them help a state that runs into its limits.
     fn candidates(integrator: Integrator, stepping: Stepping) -> Vec<Self> {
-        use Integrator::{Euler, RungeKutta4};
+        use Integrator::{Discrete, Euler, RungeKutta4};
         let own = stepping.substeps;
         let all = match integrator {
             Euler => vec![
@@ -31,6 +31,7 @@ impl OtherStep {
                 (Euler, 16 * own),
                 (RungeKutta4, own.max(16)),
             ],
+            Discrete => vec![],
             rule => vec![(rule, 2 * own), (rule, 4 * own), (rule, 16 * own)],
         };
         (all.into_iter())

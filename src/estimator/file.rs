@@ -15,7 +15,7 @@ use crate::math::one_row;
 use crate::network::{Architecture, NamedTensor, bytes_of, values_of};
 use crate::storage::files::{replace, sha256, write_new};
 use crate::storage::untrusted::{message, read};
-use crate::study::StudyFile;
+use crate::study::{Study, StudyFile};
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -155,7 +155,7 @@ fn bytes(estimator: &Estimator) -> Result<Vec<u8>, String> {
     let space = study.twin().parameters();
     let mut header = Header {
         schema: SCHEMA,
-        study: toml::to_string(study.file()).map_err(|error| error.to_string())?,
+        study: study.file().written().map_err(|error| error.to_string())?,
         names: space.names().into_iter().map(str::to_owned).collect(),
         preset: estimator.preset,
         features: estimator.recipe.clone(),
@@ -283,16 +283,22 @@ fn unread(error: SafeTensorError) -> String {
 /// The known project of the file's twin, in the file's setting.
 fn project(header: &Header, path: &Path, known: &[Project]) -> Result<Project, String> {
     let file = StudyFile::parse(&header.study, path).map_err(|error| error.to_string())?;
-    let registered = known.iter().find(|p| p.study().name() == file.twin);
-    let registered = registered.ok_or_else(|| {
-        let known: Vec<_> = known.iter().map(|p| p.study().name()).collect();
-        format!(
-            "made for twin \"{}\", known are {}; use the program that has this twin",
-            file.twin,
-            known.join(", ")
-        )
-    })?;
-    let project = (registered.configure(&file)).map_err(|error| error.to_string())?;
+    let project = match file.own_equations() {
+        Some(_) => Study::of_file(&file).map(Project::from),
+        None => {
+            let registered = known.iter().find(|p| p.study().name() == file.twin);
+            let registered = registered.ok_or_else(|| {
+                let known: Vec<_> = known.iter().map(|p| p.study().name()).collect();
+                format!(
+                    "made for twin \"{}\", known are {}; use the program that has this twin",
+                    file.twin,
+                    known.join(", ")
+                )
+            })?;
+            registered.configure(&file)
+        }
+    };
+    let project = project.map_err(|error| error.to_string())?;
     let names = project.study().twin().parameters().names().join(", ");
     let made_for = header.names.join(", ");
     if names != made_for {

@@ -32,7 +32,9 @@ pub(crate) fn other_hold(
     problem: &Problem,
     fitted: &Fitted,
 ) -> Result<Option<OtherHold>, FilterError> {
-    let Some((integrator, own)) = problem.twin.integration() else {
+    // Nothing is between the samples of discrete time.
+    let rule = problem.twin.integration();
+    let Some((integrator, own)) = rule.filter(|(rule, _)| *rule != Integrator::Discrete) else {
         return Ok(None);
     };
     let moves = problem.records.iter().any(|record| {

@@ -1,5 +1,6 @@
 //! The error of a study, its fits and its diagnoses.
 
+use crate::equations::EquationsError;
 use crate::likelihood::kalman::FilterError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
@@ -30,6 +31,14 @@ pub enum StudyError {
         /// Message of the parser, in one line.
         message: String,
     },
+    /// The equations of a study file are wrong.
+    #[error(transparent)]
+    Equations(#[from] EquationsError),
+    /// A study is to be made of a file that has no equations of its own.
+    #[error(
+        "the study file has no equations, it is about the twin \"{0}\"; add the tables states and outputs, or configure a study of that twin"
+    )]
+    NoEquations(String),
     /// A program or an FMU cannot be used as a twin.
     #[error("{0}")]
     Simulator(String),

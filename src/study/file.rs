@@ -1,6 +1,7 @@
 //! The study file: a twin in the user's own setting.
 
 use crate::effect::EffectEntry;
+use crate::equations::{self, Equations};
 use crate::feature::FeatureRecipe;
 use crate::record::Drive;
 use crate::setting::number;
@@ -21,6 +22,8 @@ use toml::de::DeTable;
 const MOST: u64 = 1 << 20;
 
 /// Content of a study file; everything but `twin` is optional, unknown keys are refused.
+///
+/// In place of `twin = "tanks"`, a file may have the twin itself: the tables that [`Equations`] reads.
 ///
 /// ```toml
 /// twin = "tanks"
@@ -97,6 +100,9 @@ pub struct StudyFile {
     /// Which effects a diagnosis may name.
     #[serde(skip_serializing_if = "Library::is_empty")]
     pub(crate) library: Library,
+    /// The twin, if the file has its equations.
+    #[serde(skip)]
+    pub(crate) equations: Option<Equations>,
     /// Path and text that it was parsed from, for the lines in messages; none if it was made in the program.
     #[serde(skip)]
     pub(crate) origin: Option<(PathBuf, Arc<str>)>,
@@ -145,17 +151,39 @@ impl StudyFile {
             let start = error.span().map_or(0, |span| span.start);
             wrong(line(text, start), error.message())
         };
-        let table = DeTable::parse(text).map_err(syntax)?;
+        let mut table = DeTable::parse(text).map_err(syntax)?;
         check_shapes(table.get_ref())
             .map_err(|(start, problem)| wrong(line(text, start), &problem))?;
-        let mut file: Self = toml::from_str(text).map_err(syntax)?;
-        let table: toml::Table = toml::from_str(text).map_err(syntax)?;
-        check_names(&table).map_err(|problem| wrong(1, &problem))?;
-        if !table.contains_key("twin") {
+        let equations =
+            equations::take(text, table.get_mut()).map_err(|error| error.in_file(path))?;
+        let mut rest: toml::Table = toml::from_str(text).map_err(syntax)?;
+        if equations.is_some() {
+            rest.retain(|key, _| !equations::TABLES.iter().any(|table| *table == key));
+        }
+        check_names(&rest).map_err(|problem| wrong(1, &problem))?;
+        if equations.is_none() && !rest.contains_key("twin") {
             return Err(StudyError::NoTwin(path.into()));
         }
+        let mut file = Self::deserialize(toml::de::Deserializer::from(table)).map_err(syntax)?;
+        file.equations = equations;
         file.origin = Some((path.into(), text.into()));
         Ok(file)
+    }
+
+    /// The twin of the file, if it has one in equations.
+    pub fn own_equations(&self) -> Option<&Equations> {
+        self.equations.as_ref()
+    }
+
+    /// Returns the text of a file that is read as this one.
+    pub(crate) fn written(&self) -> Result<String, toml::ser::Error> {
+        let Some(equations) = &self.equations else {
+            return toml::to_string(self);
+        };
+        // The equations name the twin.
+        let mut rest = toml::Table::try_from(self)?;
+        rest.remove("twin");
+        Ok(format!("{}{}", equations.text(), toml::to_string(&rest)?))
     }
 
     /// Adds to the error of effect `index` its line, if the file was parsed from a text.

@@ -2,6 +2,7 @@
 
 use super::{Study, StudyError};
 use crate::effect::Effect;
+use crate::equations::Declared;
 use crate::fit::{Fit, FitScore, FitSettings, Subject, Warning, other_hold, run, score};
 use crate::hypothesis::search::asked::with_asked_noise;
 use crate::hypothesis::search::effects::searched;
@@ -147,15 +148,23 @@ impl Study {
         });
         let starts = (self.file.start.iter())
             .filter(|(_, level)| matches!(level, StartLevel::Declared { .. }));
+        // The tables of a study stand over what its equations say.
+        let mut own =
+            (self.file.own_equations()).map_or(Declared::default(), |e| e.declared().clone());
+        own.known.retain(|name| !noise.levels.contains_key(name));
+        own.known.extend(noise.known(self.base.outline().as_ref()));
+        own.factors.extend(factors);
+        own.estimated
+            .retain(|name| !self.file.start.contains_key(name));
+        let unknown =
+            (self.file.start.iter()).filter(|(_, level)| matches!(level, StartLevel::Estimate));
+        own.estimated.extend(unknown.map(|(name, _)| name.clone()));
         Beliefs {
             // A study without a plan has been given the one of its records.
             step: self.plan.as_ref().map_or(1.0, |plan| plan.step),
-            known: noise.known(self.base.outline().as_ref()),
-            factors: factors.collect(),
-            estimated: (self.file.start.iter())
-                .filter(|(_, level)| matches!(level, StartLevel::Estimate))
-                .map(|(name, _)| name.clone())
-                .collect(),
+            known: own.known,
+            factors: own.factors,
+            estimated: own.estimated,
             wide: (starts.clone())
                 .filter(|(_, level)| !matches!(level, StartLevel::Declared { std: 0.0, .. }))
                 .map(|(name, _)| name.clone())

@@ -20,7 +20,7 @@ impl Study {
             .with("twin", self.name())
             .with("parameters", parameters)
             // A file that was read can be written.
-            .with("study", toml::to_string(self.file()).unwrap_or_default())
+            .with("study", self.file().written().unwrap_or_default())
             .with("record", json!(self.plan().map(|p| (p.step, p.samples))));
         let manifest = match self.plan().and_then(|plan| plan.input.as_ref()) {
             Some(InputPlan::File(path)) => manifest.with("input file", checksum(path)?),

@@ -29,6 +29,7 @@ use crate::twin::{
 };
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Name of a twin that was given none.
@@ -59,6 +60,8 @@ pub struct Study {
     plan: Option<RecordPlan>,
     file: StudyFile,
     demo: Option<Arc<(StudyFile, Record)>>,
+    /// The twin as the text of a study file.
+    text: Option<&'static str>,
     /// The library's effects and the study's own.
     catalogue: Catalogue,
 }
@@ -80,6 +83,37 @@ impl Study {
         Self::named(name, twin, Some(plan))
     }
 
+    /// Creates the study of a file that has the twin's equations.
+    ///
+    /// ```
+    /// use truetwin::study::{Study, StudyFile};
+    ///
+    /// let text = r#"
+    ///     [twin]
+    ///     name = "tank"
+    ///     [parameters]
+    ///     k = { unit = "1/s", prior = [0.2, 1.0], bounds = [0.05, 3.0] }
+    ///     [states]
+    ///     h = { unit = "m", rate = "-k*h", start = 1.0 }
+    ///     [outputs]
+    ///     y = { unit = "m", value = "h", noise = 0.02 }
+    /// "#;
+    /// let study = Study::of_file(&StudyFile::parse(text, "tank.toml".as_ref())?)?;
+    /// assert_eq!(study.twin().parameters().names(), ["k"]);
+    /// # Ok::<(), truetwin::study::StudyError>(())
+    /// ```
+    pub fn of_file(file: &StudyFile) -> Result<Self, StudyError> {
+        match file.own_equations() {
+            Some(equations) => Self::named(&file.twin, equations.clone(), None)?.configure(file),
+            None => Err(StudyError::NoEquations(file.twin.clone())),
+        }
+    }
+
+    /// As [`of_file`](Self::of_file), from its path.
+    pub fn read(path: &Path) -> Result<Self, StudyError> {
+        Self::of_file(&StudyFile::read(path)?)
+    }
+
     fn named(
         name: &str,
         twin: impl DigitalTwin + 'static,
@@ -98,6 +132,7 @@ impl Study {
                 ..StudyFile::default()
             },
             demo: None,
+            text: None,
             catalogue: Catalogue::default(),
         })
     }
@@ -131,6 +166,21 @@ impl Study {
         let mut file = self.file.clone();
         file.noise.process = Some(process);
         self.configure(&file)
+    }
+
+    /// With the twin as the text of a study file, for whoever wants to change its equations.
+    #[must_use]
+    pub fn with_text(mut self, text: &'static str) -> Self {
+        self.text = Some(text);
+        self
+    }
+
+    /// The twin, and its setting where that is a file's, as the text of a study file; `None` of compiled equations without one.
+    pub fn text(&self) -> Option<String> {
+        match self.file.own_equations() {
+            Some(_) => self.file.written().ok(),
+            None => self.text.map(str::to_owned),
+        }
     }
 
     /// The study in the setting of a file about the same twin. θ becomes: the twin's parameters that are not fixed,
@@ -266,6 +316,24 @@ impl Study {
             return Err(StudyError::Plan(format!(
                 "substeps = {n}; choose between 1 and {MOST_SUBSTEPS}"
             )));
+        }
+        let is_discrete = |rule: Integrator| rule == Integrator::Discrete;
+        if let Some((own, _)) = self.base.integration() {
+            let wrong = match integrator {
+                Some(rule) => is_discrete(rule) != is_discrete(own),
+                None => is_discrete(own),
+            };
+            if wrong || is_discrete(own) && (substeps, hold) != (None, None) {
+                return Err(StudyError::Plan(format!(
+                    "{key}: {}",
+                    match is_discrete(own) {
+                        true =>
+                            "the twin moves from sample to sample, with nothing between; remove it",
+                        false =>
+                            "the twin has rates, and no next values; choose another integrator",
+                    }
+                )));
+            }
         }
         let change = |rule: &mut Integrator, stepping: &mut Stepping| {
             *rule = integrator.unwrap_or(*rule);

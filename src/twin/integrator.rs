@@ -121,6 +121,9 @@ pub enum Integrator {
     /// The classical fourth-order Runge–Kutta step.
     #[serde(rename = "runge-kutta-4")]
     RungeKutta4,
+    /// x ← f(t, x): the drift is the state at the next sample, and nothing is between samples. Forces of effects are rates still: they
+    /// add Δt times themselves.
+    Discrete,
 }
 
 /// Buffers of one twin that outlive a step, so that the loop allocates nothing.
@@ -170,7 +173,7 @@ impl Workspace {
     /// Returns whether a sample is one step of Euler's rule, inputs held.
     #[inline]
     pub(super) fn is_plain(&self) -> bool {
-        self.refined.is_none() && self.integrator == Integrator::Euler
+        self.refined.is_none() && self.integrator != Integrator::RungeKutta4
     }
 
     /// Buffers of a single step.
@@ -299,7 +302,8 @@ impl Integrator {
     ) {
         let dt = now.dt;
         match self {
-            Self::Euler => {
+            // The engine gives a discrete twin's way to the next sample as a rate.
+            Self::Euler | Self::Discrete => {
                 // Few numbers stay in registers where the drift is compiled into this.
                 let mut few = [0.0; 4];
                 let slope = match x.len() {

@@ -10,6 +10,7 @@
 //! | find out what is wrong with a new twin | [`conformance`] |
 
 mod adapt;
+mod blocks;
 mod composed;
 pub mod conformance;
 mod definitions;
@@ -26,6 +27,7 @@ mod points;
 mod state_space;
 
 pub(crate) use adapt::{Adaptation, DeclaredNoise, NoiseLevel, StartLevel, adapt, begun, fix};
+pub(crate) use blocks::Blocks;
 pub(crate) use composed::{
     Acting, DeadTime, Disturbance, Entry, FittedLevels, KnownNoise, LARGEST, Law, LawPart,
     LawPlace, LevelSource, LevelValue, NoisePart, ParameterChange, RateChange, SensorNoise,

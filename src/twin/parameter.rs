@@ -106,7 +106,7 @@ impl Parameter {
     }
 
     /// Checks that prior and bounds are finite and in order, and the prior inside the bounds.
-    fn check(&self) -> Result<(), TwinError> {
+    pub(crate) fn check(&self) -> Result<(), TwinError> {
         let Self {
             name,
             prior,

@@ -2,7 +2,7 @@
 
 use crate::record::{Quantity, Signals};
 use crate::twin::{
-    Integrator, Interval, Now, Parameter, ParameterSpace, SimulationError, Stepping,
+    Blocks, Integrator, Interval, Now, Parameter, ParameterSpace, SimulationError, Stepping,
 };
 
 /// A twin given by its equations
@@ -52,7 +52,8 @@ pub trait StateSpace: Send + Sync {
     /// Parameters, states, inputs and outputs with names and units.
     fn outline(&self) -> Outline;
 
-    /// `dx` = f: rates of the states `x`, in state units per second.
+    /// `dx` = f: rates of the states `x`, in state units per second; of a twin in discrete time ([`Integrator::Discrete`]) the states at
+    /// the next sample.
     fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]);
 
     /// `y` = g: outputs of `x` without noise.
@@ -105,6 +106,12 @@ pub trait StateSpace: Send + Sync {
     /// changes them: `[record] substeps` and `hold`.
     fn stepping(&self) -> Stepping {
         Stepping::default()
+    }
+
+    /// The same equations for many points in one call, where that is faster; none by default.
+    #[doc(hidden)]
+    fn blocks(&self) -> Option<&dyn Blocks> {
+        None
     }
 }
 

@@ -5,3 +5,8 @@ mod van_der_pol;
 
 pub use cascaded_tanks::CascadedTanks;
 pub use van_der_pol::VanDerPol;
+
+/// [`CascadedTanks`] as text; a test compares both.
+pub(crate) const TANKS: &str = include_str!("../../examples/tanks.toml");
+/// [`VanDerPol`] as text; a test compares both.
+pub(crate) const VAN_DER_POL: &str = include_str!("../../examples/van-der-pol.toml");

@@ -4,7 +4,7 @@ use crate::source::Crate;
 use std::collections::BTreeMap;
 
 /// The rooms of docs/architecture.md, lowest first.
-const ROOMS: [&str; 21] = [
+const ROOMS: [&str; 22] = [
     "setting",
     "math",
     "progress",
@@ -12,6 +12,7 @@ const ROOMS: [&str; 21] = [
     "record",
     "twin",
     "twins",
+    "equations",
     "effect",
     "likelihood",
     "fit",

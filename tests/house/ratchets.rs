@@ -276,13 +276,13 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     let files = sources.sources.values();
     let files = files.map(|source| source.file.display().to_string());
     vec![
-        Ratchet::new("public items", 153, items.collect()),
-        Ratchet::new("error types", 13, errors),
-        Ratchet::new("lines of code", 50_000, lines),
-        Ratchet::new("files", 417, files.collect()),
-        Ratchet::new("hidden items", 2, hidden(sources)),
-        Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 414, constants(sources)),
+        Ratchet::new("public items", 159, items.collect()),
+        Ratchet::new("error types", 14, errors),
+        Ratchet::new("lines of code", 53_700, lines),
+        Ratchet::new("files", 442, files.collect()),
+        Ratchet::new("hidden items", 3, hidden(sources)),
+        Ratchet::new("methods of StateSpace", 14, methods_of_state_space(sources)),
+        Ratchet::new("named numeric constants", 452, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             4,

@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from . import _process, _records
+from ._equations import Entry, Expression, Text
 from ._errors import TruetwinError
 from ._records import Record, Records
 from ._report import Report
 from ._results import Check, Diagnosis, Estimate, Estimator, Fit, Json, Scorecard
 from ._server import Server
-from ._simulator import Array, Model, Parameter, Range, Simulator
+from ._simulator import Array, Model, Parameter, Range, Simulator, _units
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped, unused-ignore]
@@ -37,6 +38,14 @@ class Twin:
         If `f` has an argument `step`, it gets the step in seconds. If it has an argument `seed`, it draws its own noise from it,
         and none if it is None; `noise` is much faster. Without a callable, the twin is one that the program knows: give `study`, or
         use `Twin.named`.
+    states : dict of str to expression or dict, optional
+        Equations in place of a callable, which needs no Python to run: the rate of each state as a text or an expression of sympy, or a dict
+        of ``rate`` (or ``next``), ``start``, ``noise``, ``limits`` and ``unit``. `outputs` then is a dict of expressions or of dicts of
+        ``value``, ``noise`` and ``unit``. `toml` returns the file.
+    constants, define : dict of str to number or expression, optional
+        Constants, and names for parts of equations.
+    record : dict, optional
+        Further keys of ``[record]``, such as ``{"integrator": "euler"}``, for equations.
     parameters : dict of str to (low, high) or Parameter
         Range of plausible values for each parameter; `Parameter` adds bounds and a unit.
     inputs, outputs : str, sequence of str, or dict of str to unit
@@ -78,8 +87,12 @@ class Twin:
         simulator: Simulator | None = None,
         *,
         parameters: Mapping[str, Parameter | Range] | None = None,
-        inputs: str | Sequence[str] | Mapping[str, str] = (),
-        outputs: str | Sequence[str] | Mapping[str, str] | None = None,
+        inputs: str | Sequence[str] | Mapping[str, Any] = (),
+        outputs: str | Sequence[str] | Mapping[str, Any] | None = None,
+        states: Mapping[str, Entry] | None = None,
+        constants: Mapping[str, Expression] | None = None,
+        define: Mapping[str, Expression] | None = None,
+        record: Mapping[str, Any] | None = None,
         step: float | None = None,
         noise: float | Mapping[str, float] | None = None,
         samples: int = 300,
@@ -97,6 +110,23 @@ class Twin:
         self._timeout = timeout
         self._noise: dict[str, float] = {}
         self._model: Model | None = None
+        self._text: Text | None = None
+        if states is not None:
+            if simulator is not None or study is not None:
+                raise ValueError("states and a callable or a study; equations stand alone")
+            if not parameters or not isinstance(outputs, Mapping) or not outputs:
+                raise ValueError("equations need parameters={name: (low, high)} and outputs={name: expression}")
+            plan: dict[str, Any] = {} if step is None else {"step": float(step), "samples": int(samples)}
+            if levels is not None:
+                plan["input"] = {"levels": [float(level) for level in levels], "hold": int(hold)}
+            self._text = Text(
+                name or "twin", parameters, _noisy(states, noise, outputs, True), inputs if isinstance(inputs, Mapping) else _units(inputs),
+                _noisy(outputs, noise, outputs, False), constants or {}, define or {}, {**plan, **(record or {})},
+            )  # fmt: skip
+            self.name: str | None = self._text.name
+            return
+        if constants or define or record:
+            raise ValueError("constants, define and record belong to equations; give states={name: rate}")
         if simulator is None:
             if parameters or outputs or noise is not None or inputs or step is not None:
                 raise ValueError("parameters, inputs, outputs, step and noise describe a callable; give it, or put them into the study file")
@@ -122,6 +152,12 @@ class Twin:
     def named(cls, name: str, *, threads: int | None = None) -> Twin:
         """Return a reference twin of the program, such as ``"tanks"``; ``truetwin twins`` lists them."""
         return cls(name=name, threads=threads)
+
+    def toml(self) -> str:
+        """Return a twin of equations as the text of a study file, which the program takes with ``--study``."""
+        if self._text is None:
+            raise ValueError("only a twin of equations has a text; give states={name: rate}")
+        return self._text.text
 
     def __repr__(self) -> str:
         return f"Twin({self.name or os.fspath(self._study or '')!r})"
@@ -330,7 +366,7 @@ class Twin:
             if noise_free:
                 options.append("--noise-free")
             call.run("simulate", options, seed)
-            model = self._model
+            model = self._model or self._text
             record = _records.read(file, list(model.inputs) if model else [], list(model.outputs) if model else [])
             return _records.as_frame(record) if _records.is_frame(inputs) else record
 
@@ -422,7 +458,7 @@ class _Call:
     def records(self, records: Records, columns: Mapping[str, str] | None) -> list[str]:
         """Return the paths of records, after writing those that are no files."""
         if self._writer is None:
-            model = self._model
+            model = self._model or self._twin._text
             known = None if model is None else [*model.inputs, *model.outputs]
             self._writer = _records.Writer(self.path, columns, known, None if model is None else model.step)
         return [self._writer.path(record) for record in _records.as_list(records)]
@@ -440,6 +476,10 @@ class _Call:
         twin = self._twin
         if twin._study is not None:
             return ["--study", os.fspath(twin._study)]
+        if twin._text is not None:
+            file = self.path / "twin.toml"
+            file.write_text(twin._text.text, encoding="utf-8")
+            return ["--study", str(file)]
         if self._model is None:
             return ["--twin", str(twin.name)]
         if noise and twin._noise:
@@ -469,6 +509,17 @@ class _Call:
         """Run a verb that fills a folder; return the folder and what it prints."""
         folder = self.path / "result" if out is None else Path(out)
         return folder, self.run(verb, [*options, "--out", str(folder)], seed)
+
+
+def _noisy(entries: Mapping[str, Entry], noise: float | Mapping[str, Any] | None, outputs: Mapping[str, Any], rates: bool) -> dict[str, Entry]:
+    """Return entries of states or outputs with the noise of the call: a number is that of each output."""
+    levels = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(outputs, float(noise))
+    key = "rate" if rates else "value"
+    noisy: dict[str, Entry] = {}
+    for name, entry in entries.items():
+        level = levels.get(name)
+        noisy[name] = entry if level is None else {**(entry if isinstance(entry, Mapping) else {key: entry}), "noise": level}
+    return noisy
 
 
 def _option(name: str, value: int | None) -> list[str]:

@@ -43,7 +43,9 @@ macro_rules! verbs {
 
 // A new verb needs a file, a `mod`, and a line here.
 verbs! {
+    New(twins),
     Twins(twins),
+    Export(twins),
     Effects(effects),
     Check(check),
     Resample(resample),

@@ -1,8 +1,9 @@
-//! `twins`: lists the twins.
+//! `twins`, `new` and `export`: lists the twins, writes texts to begin with.
 
 use crate::cli::prelude::*;
 use crate::estimator::Project;
 use crate::record::Quantity;
+use clap::ValueEnum;
 
 /// List the twins: parameters, units, prior, bounds, channels.
 #[derive(Debug, Args)]
@@ -67,4 +68,74 @@ fn in_words(study: &Study) -> String {
         text += &format!("  {:<12} {:<8} {prior:<16} {bounds}\n", p.name, p.unit);
     }
     text
+}
+
+/// Write a study file with equations to begin with, commented.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin new pendulum > pendulum.toml\n\
+        Next: change names and equations, then truetwin check --study pendulum.toml")]
+pub(in crate::cli) struct New {
+    /// The system that is nearest to yours.
+    #[arg(value_enum, default_value_t = Template::Pendulum)]
+    system: Template,
+}
+
+/// Systems of several fields, each a file of `examples/`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Template {
+    /// A pushed pendulum: two states, one input, a known start.
+    Pendulum,
+    /// Two tanks: levels with limits, definitions.
+    Tanks,
+    /// A DC motor with dry friction.
+    DcMotor,
+    /// An epidemic: noise that follows the signal.
+    Sir,
+    /// A heat exchanger with two inputs and two outputs.
+    HeatExchanger,
+}
+
+impl Template {
+    fn text(self) -> &'static str {
+        match self {
+            Self::Pendulum => include_str!("../../../examples/pendulum.toml"),
+            Self::Tanks => include_str!("../../../examples/tanks.toml"),
+            Self::DcMotor => include_str!("../../../examples/dc-motor.toml"),
+            Self::Sir => include_str!("../../../examples/sir.toml"),
+            Self::HeatExchanger => include_str!("../../../examples/heat-exchanger.toml"),
+        }
+    }
+}
+
+impl Verb for New {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let text = self.system.text();
+        let json = json!({ "schema": "truetwin.new/1", "study": text });
+        context.print(&json, || text.trim_end().to_owned())
+    }
+}
+
+/// Write a twin as the text of a study file, for whoever wants to change its equations.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin export --twin tanks > tanks.toml\n\
+        Next: change an equation, then truetwin check --study tanks.toml")]
+pub(in crate::cli) struct Export {
+    #[command(flatten)]
+    subject: Subject,
+}
+
+impl Verb for Export {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let study = context.study(&self.subject)?;
+        let Some(text) = study.text() else {
+            return Err(Failure::user(format!(
+                "the twin {} has no text, its equations are compiled; `truetwin new` writes a file to begin with",
+                study.name()
+            )));
+        };
+        let json = json!({ "schema": "truetwin.export/1", "twin": study.name(), "study": text });
+        context.print(&json, || text.trim_end().to_owned())
+    }
 }

@@ -12,7 +12,7 @@ use crate::feature::{Ar, Arx};
 use crate::network::{Compact, Deep, Training, architecture};
 use crate::record::parse_record;
 use crate::study::{Library, RecordPlan, Study, StudyError, StudyFile};
-use crate::twins::{CascadedTanks, VanDerPol};
+use crate::twins::{self, CascadedTanks, VanDerPol};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -43,7 +43,8 @@ fn van_der_pol() -> Result<Project, StudyError> {
     let plan = RecordPlan::autonomous(0.05, 300);
     let file = StudyFile::parse(DEMO_STUDY, Path::new("demo-van-der-pol.toml"))?;
     let demo = parse_record(DEMO, Path::new("demo-van-der-pol.csv"))?;
-    let study = Study::new("van-der-pol", VanDerPol, plan)?.with_demo(file, demo);
+    let study = Study::new("van-der-pol", VanDerPol, plan)?;
+    let study = study.with_demo(file, demo).with_text(twins::VAN_DER_POL);
     Ok(Project::from(study).with_recipe(PresetName::Paper, recipe))
 }
 
@@ -58,7 +59,7 @@ fn tanks() -> Result<Project, StudyError> {
         settings: paper(width, 1e-4, 250, 5e-4, 1000),
     };
     let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
-    let study = Study::new("tanks", CascadedTanks, plan)?;
+    let study = Study::new("tanks", CascadedTanks, plan)?.with_text(twins::TANKS);
     Ok(Project::from(study).with_recipe(PresetName::Paper, recipe))
 }
 
@@ -92,7 +93,12 @@ impl Benchmark {
     /// Returns what the paper has about a study's twin; nothing about other twins than its own. Its figures are left out where
     /// the study changes prior, records, noise or start.
     pub fn of(study: &Study) -> Self {
-        let paper = match study.name() {
+        // A text of one's own may have any name.
+        let name = match study.file().own_equations() {
+            Some(_) => "",
+            None => study.name(),
+        };
+        let paper = match name {
             "van-der-pol" => Self {
                 points: &VAN_DER_POL_POINTS,
                 published: &VAN_DER_POL_TABLE,

@@ -3,7 +3,7 @@
 use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
 use crate::record::{Drive, Signal};
-use crate::twin::{Composed, MOST_SUBSTEPS, Noise, SimulationError, Twin};
+use crate::twin::{Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, Twin};
 
 /// Largest error of the step where no noise is declared, as a share of an output's deviation.
 const STEP_SHARE: f64 = 0.01;
@@ -42,7 +42,7 @@ pub(crate) fn coarse_step(
     theta: &[f64],
     drive: &Drive,
 ) -> Option<Result<Option<String>, SimulationError>> {
-    let equations = twin.equations()?;
+    let equations = (twin.equations()).filter(|own| own.integrator() != Integrator::Discrete)?;
     let known = step_error(twin, theta, drive)
         .and_then(|errors| Ok((errors, step_levels(equations, theta, drive)?)));
     let (errors, levels) = match known {

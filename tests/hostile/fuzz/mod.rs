@@ -94,6 +94,7 @@ macro_rules! fuzzed {
 fuzzed!(
     record,
     study,
+    equations,
     effect,
     estimator,
     manifest,

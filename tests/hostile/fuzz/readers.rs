@@ -20,6 +20,7 @@ use truetwin::network::layers::*;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record};
 use truetwin::study::{RecordPlan, Study, StudyFile};
+use truetwin::twin::Noise;
 use truetwin::twins::VanDerPol;
 
 /// Reader of bytes: `Ok`, or the message that a user would see.
@@ -31,6 +32,7 @@ pub fn readers() -> Vec<(&'static str, Reader)> {
     vec![
         ("record", record),
         ("study", study),
+        ("equations", equations),
         ("effect", effect),
         ("estimator", estimator),
         ("manifest", manifest),
@@ -85,6 +87,26 @@ pub fn study(data: &[u8]) -> Result<(), String> {
         Some(project) => project.configure(&found).map(|_| ()).map_err(text),
         None => Ok(()),
     }
+}
+
+/// A study file with equations, up to a short simulation of the study that it makes.
+pub fn equations(data: &[u8]) -> Result<(), String> {
+    let text = std::str::from_utf8(data).map_err(text)?;
+    let file = StudyFile::parse(text, Path::new("equations.toml")).map_err(self::text)?;
+    if file.own_equations().is_none() {
+        return Ok(());
+    }
+    let study = Study::of_file(&file).map_err(self::text)?;
+    let twin = study.twin();
+    let inputs = ndarray::Array2::ones((4, twin.signals().inputs.len()));
+    let drive = Drive::new(0.1, inputs).map_err(self::text)?;
+    // It may diverge.
+    let _ = twin.simulate(
+        &twin.parameters().centre(),
+        &drive,
+        Noise::new(1, "fuzz", 0),
+    );
+    Ok(())
 }
 
 /// An effect file, up to the twin that has the effects.

@@ -1,0 +1,466 @@
+//! The tables of a file as a twin.
+
+use super::declared::{Declared, NoiseValue, StartValue};
+use super::entries::{TableEntry, entries};
+use super::error::EquationsError;
+use super::graph::{Graph, Id, Varies};
+use super::names::{Meaning, Scope};
+use super::place::{SourceText, number};
+use super::tape::OperationTape;
+use super::twin::{Equations, Tapes};
+use crate::record::Quantity;
+use crate::setting::did_you_mean;
+use crate::storage::untrusted::{excerpt, message};
+use crate::twin::{Hold, Integrator, Interval, Outline, Parameter, Stepping};
+use std::sync::Arc;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Tables of a twin, in the order in which they are written.
+pub(crate) const TABLES: [&str; 7] = [
+    "twin",
+    "parameters",
+    "constants",
+    "define",
+    "states",
+    "inputs",
+    "outputs",
+];
+/// Table of records, of which the integrator is read here.
+const RECORD: &str = "record";
+/// Name of a twin that has none.
+const UNNAMED: &str = "twin";
+/// Longest text, in bytes.
+const MOST: usize = 1 << 20;
+
+impl Equations {
+    /// Reads the tables `twin`, `parameters`, `constants`, `define`, `states`, `inputs`, `outputs`, and the integrator of `record`.
+    ///
+    /// A whole study file is read by [`StudyFile`](crate::study::StudyFile).
+    ///
+    /// # Errors
+    ///
+    /// [`EquationsError`]: no TOML, unknown keys or names, definitions in a circle, names in two tables.
+    pub fn parse(text: &str) -> Result<Self, EquationsError> {
+        let source = SourceText(text);
+        if text.len() > MOST {
+            return source.error(0, format!("more than {} MiB of text", MOST >> 20));
+        }
+        let file = DeTable::parse(text).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start);
+            EquationsError::at(text, start, message(error.message()))
+        })?;
+        let file = file.get_ref();
+        for key in file.keys() {
+            let name: &str = key.get_ref();
+            if !TABLES.contains(&name) && name != RECORD {
+                let problem = format!(
+                    "\"{}\" is no table of a twin{}; there are {} and {RECORD}; a study file has more",
+                    excerpt(name),
+                    did_you_mean(name, TABLES),
+                    TABLES.join(", ")
+                );
+                return source.error(key.span().start, problem);
+            }
+        }
+        read(source, file)
+    }
+}
+
+/// Takes the tables of a twin out of a study file, whose key `twin` then is a name; `None` where the file has no equations.
+pub(crate) fn take(
+    text: &str,
+    file: &mut DeTable<'_>,
+) -> Result<Option<Equations>, EquationsError> {
+    let given = |table: &&str| file.get(*table).is_some();
+    let Some(first) = TABLES[1..].iter().find(|table| given(table)) else {
+        return Ok(None);
+    };
+    if !file.contains_key("states") {
+        let byte = file.get(*first).map_or(0, |value| value.span().start);
+        let problem =
+            format!("{first} belongs to equations, and there are no states; add that table");
+        return SourceText(text).error(byte, problem);
+    }
+    let equations = read(SourceText(text), file)?;
+    for table in TABLES {
+        file.remove(table);
+    }
+    let name = DeValue::String(equations.name().to_owned().into());
+    file.insert(Spanned::new(0..0, "twin".into()), Spanned::new(0..0, name));
+    Ok(Some(equations))
+}
+
+/// Values of one state.
+struct StateText {
+    motion: Id,
+    start: StartValue,
+    noise: NoiseValue,
+    /// Ends of its limits.
+    limits: [Id; 2],
+}
+
+/// A twin while its tables are read.
+struct Reader<'t> {
+    names: Scope<'t>,
+    outline: Outline,
+    declared: Declared,
+    /// Key by which states are given: `rate` or `next`.
+    motion: Option<&'static str>,
+}
+
+fn read(source: SourceText<'_>, file: &DeTable<'_>) -> Result<Equations, EquationsError> {
+    let all = |table| entries(source, file, table);
+    let (states, inputs, outputs) = (all("states")?, all("inputs")?, all("outputs")?);
+    let mut reader = Reader {
+        names: Scope::new(source),
+        outline: Outline::new(),
+        declared: Declared::default(),
+        motion: None,
+    };
+    for (index, entry) in all("parameters")?.iter().enumerate() {
+        reader.names.add(entry, Meaning::Parameter(index))?;
+        reader.parameter(entry)?;
+    }
+    for (table, is_constant) in [("constants", true), ("define", false)] {
+        for entry in all(table)? {
+            let placed = entry.expression_of("the value", entry.value)?;
+            reader.names.define(&entry, placed, is_constant)?;
+        }
+    }
+    for (index, entry) in states.iter().enumerate() {
+        reader.names.add(entry, Meaning::State(index))?;
+    }
+    for (index, entry) in inputs.iter().enumerate() {
+        reader.names.add(entry, Meaning::Input(index))?;
+    }
+    for entry in &outputs {
+        reader.names.add(entry, Meaning::Output)?;
+    }
+    reader.names.resolve()?;
+    for (table, given) in [("states", &states), ("outputs", &outputs)] {
+        if given.is_empty() {
+            let byte = file.get(table).map_or(0, |value| value.span().start);
+            return source.error(
+                byte,
+                format!("the twin has no {table}; add that table with one entry or more"),
+            );
+        }
+    }
+    let hold = reader.inputs(&inputs)?;
+    let states: Vec<StateText> =
+        (states.iter().map(|entry| reader.state(entry))).collect::<Result<_, _>>()?;
+    let outputs: Vec<(Id, NoiseValue)> =
+        (outputs.iter().map(|entry| reader.output(entry))).collect::<Result<_, _>>()?;
+    let (integrator, substeps) = integrator(source, file, reader.motion == Some("next"))?;
+    let name = name(source, file)?;
+    let graph = &reader.names.graph;
+    let tapes = tapes(graph, &states, &outputs);
+    Ok(Equations {
+        limits: limits(graph, &states),
+        name,
+        outline: reader.outline,
+        tapes: Arc::new(tapes),
+        integrator,
+        stepping: Stepping { substeps, hold },
+        declared: reader.declared,
+        text: written(file).into(),
+    })
+}
+
+impl Reader<'_> {
+    fn parameter(&mut self, entry: &TableEntry<'_, '_>) -> Result<(), EquationsError> {
+        let keys = entry.keys(&["prior", "bounds", "unit", "words"])?;
+        let Some(prior) = entry.interval(keys, "prior")? else {
+            let name = excerpt(entry.name);
+            return entry.error(format!(
+                "{name} has no prior; write {name} = {{ prior = [low, high] }}"
+            ));
+        };
+        let bounds = entry.interval(keys, "bounds")?.unwrap_or(prior);
+        let unit = entry.text(keys, "unit")?;
+        entry.text(keys, "words")?;
+        let parameter = Parameter::new(entry.name, &unit, prior.low(), prior.high())
+            .within(bounds.low(), bounds.high());
+        if let Err(problem) = parameter.check() {
+            return entry.error(problem.to_string());
+        }
+        self.outline.parameters.push(parameter);
+        Ok(())
+    }
+
+    /// Reads inputs and what they are between samples.
+    fn inputs(&mut self, inputs: &[TableEntry<'_, '_>]) -> Result<Hold, EquationsError> {
+        let mut hold: Option<Hold> = None;
+        for entry in inputs {
+            let keys = entry.keys(&["unit", "hold", "words"])?;
+            self.outline.inputs.push(quantity(entry, keys)?);
+            let own = match keys.get("hold") {
+                None => Hold::Zero,
+                Some(value) => match value.get_ref().as_str() {
+                    Some("zero") => Hold::Zero,
+                    Some("linear") => Hold::Linear,
+                    Some("nearest") => Hold::Nearest,
+                    _ => return entry.wrong("hold", value, "\"zero\", \"linear\" or \"nearest\""),
+                },
+            };
+            if hold.is_some_and(|other| other != own) {
+                return entry.error(
+                    "another hold than that of the inputs before; this version has one for all",
+                );
+            }
+            hold = Some(own);
+        }
+        Ok(hold.unwrap_or_default())
+    }
+
+    fn state(&mut self, entry: &TableEntry<'_, '_>) -> Result<StateText, EquationsError> {
+        let keys = entry.keys(&["rate", "next", "unit", "start", "noise", "limits", "words"])?;
+        let name = excerpt(entry.name);
+        let key = match (keys.contains_key("rate"), keys.contains_key("next")) {
+            (true, false) => "rate",
+            (false, true) => "next",
+            (true, true) => {
+                return entry.error(format!("{name} has rate and next; give one of them"));
+            }
+            (false, false) => {
+                return entry.error(format!(
+                    "{name} has no rate; give its rate of change, or next, its value at the next sample"
+                ));
+            }
+        };
+        if self.motion.is_some_and(|before| before != key) {
+            return entry.error(format!(
+                "{name} has {key}, states before have not; give all states a rate, or all next"
+            ));
+        }
+        self.motion = Some(key);
+        let Some(motion) = entry.expression(keys, key)? else {
+            return entry.error(format!("{name} has no {key}"));
+        };
+        self.outline.states.push(quantity(entry, keys)?);
+        Ok(StateText {
+            motion: self.names.value(&motion)?,
+            start: self.declared.start(entry, keys, &mut self.names)?,
+            noise: self.declared.noise(entry, keys, &mut self.names)?,
+            limits: self.limits(entry, keys)?,
+        })
+    }
+
+    fn limits(
+        &mut self,
+        entry: &TableEntry<'_, '_>,
+        keys: &DeTable<'_>,
+    ) -> Result<[Id; 2], EquationsError> {
+        const OF: &str = "limits can name parameters, constants and definitions of these";
+        let graph = &mut self.names.graph;
+        let Some(value) = keys.get("limits") else {
+            return Ok([graph.number(f64::NEG_INFINITY), graph.number(f64::INFINITY)]);
+        };
+        let ends = match value.get_ref().as_array() {
+            Some(ends) if ends.len() == 2 => [&ends[0], &ends[1]],
+            _ => return entry.wrong("limits", value, "two ends, [low, high]"),
+        };
+        let mut ids = [0; 2];
+        for (id, end) in ids.iter_mut().zip(ends) {
+            let placed = entry.expression_of("an end of limits", end)?;
+            *id = self.names.value_within(&placed, Varies::ByParameters, OF)?;
+        }
+        let known = ids.map(|id| self.names.graph.constant(id));
+        if let [Some(low), Some(high)] = known
+            && let Err(error) = Interval::new(low, high)
+        {
+            return self
+                .source(entry)
+                .error(value.span().start, error.to_string());
+        }
+        Ok(ids)
+    }
+
+    fn source<'s>(&self, entry: &TableEntry<'_, 's>) -> SourceText<'s> {
+        entry.source
+    }
+
+    fn output(&mut self, entry: &TableEntry<'_, '_>) -> Result<(Id, NoiseValue), EquationsError> {
+        let keys = entry.keys(&["value", "unit", "noise", "words"])?;
+        let Some(value) = entry.expression(keys, "value")? else {
+            let name = excerpt(entry.name);
+            return entry.error(format!(
+                "{name} has no value; give what it shows, such as value = \"x\""
+            ));
+        };
+        self.outline.outputs.push(quantity(entry, keys)?);
+        let value = self.names.value(&value)?;
+        let noise = self.declared.noise(entry, keys, &mut self.names)?;
+        match noise.is_per_second {
+            true => entry.error("noise of an output is of each row; leave out per"),
+            false => Ok((value, noise)),
+        }
+    }
+}
+
+fn quantity(entry: &TableEntry<'_, '_>, keys: &DeTable<'_>) -> Result<Quantity, EquationsError> {
+    let mut quantity = Quantity::new(entry.name, &entry.text(keys, "unit")?);
+    quantity.description = entry.text(keys, "words")?;
+    Ok(quantity)
+}
+
+fn tapes(graph: &Graph, states: &[StateText], outputs: &[(Id, NoiseValue)]) -> Tapes {
+    let noises = || {
+        states
+            .iter()
+            .map(|s| &s.noise)
+            .chain(outputs.iter().map(|o| &o.1))
+    };
+    let levels: Vec<Id> = noises().map(|noise| noise.level).collect();
+    let ids = |of: &dyn Fn(&StateText) -> Id| -> Vec<Id> { states.iter().map(of).collect() };
+    let ends: Vec<Id> = states.iter().flat_map(|state| state.limits).collect();
+    let is_constant = ends.iter().all(|id| graph.constant(*id).is_some());
+    Tapes {
+        drift: OperationTape::new(graph, &ids(&|state| state.motion)),
+        observe: OperationTape::new(graph, &outputs.iter().map(|o| o.0).collect::<Vec<_>>()),
+        noise: OperationTape::new(graph, &levels),
+        per_second: noises().map(|noise| noise.is_per_second).collect(),
+        given: (0..states.len())
+            .filter(|i| states[*i].start.is_given)
+            .collect(),
+        start: OperationTape::new(graph, &ids(&|state| state.start.mean)),
+        deviation: OperationTape::new(graph, &ids(&|state| state.start.deviation)),
+        ends: (!is_constant).then(|| OperationTape::new(graph, &ends)),
+    }
+}
+
+/// Limits that are numbers; those that are not are felt beside them.
+fn limits(graph: &Graph, states: &[StateText]) -> Vec<Interval> {
+    let of = |state: &StateText| {
+        let ends = state.limits.map(|id| graph.constant(id));
+        match ends {
+            [Some(low), Some(high)] => Interval::unchecked(low, high),
+            [Some(low), None] => Interval::unchecked(low, f64::INFINITY),
+            [None, Some(high)] => Interval::unchecked(f64::NEG_INFINITY, high),
+            [None, None] => Interval::EVERYTHING,
+        }
+    };
+    states.iter().map(of).collect()
+}
+
+/// Reads the name of the twin.
+fn name(source: SourceText<'_>, file: &DeTable<'_>) -> Result<String, EquationsError> {
+    let Some(twin) = file.get("twin") else {
+        return Ok(UNNAMED.into());
+    };
+    if let Some(name) = twin.get_ref().as_str() {
+        return Ok(name.into());
+    }
+    let whole = TableEntry {
+        source,
+        table: "twin",
+        name: "twin",
+        byte: twin.span().start,
+        value: twin,
+    };
+    let name = whole.text(whole.keys(&["name"])?, "name")?;
+    Ok(if name.is_empty() {
+        UNNAMED.into()
+    } else {
+        name
+    })
+}
+
+/// Reads the integrator and the number of its steps within a sample.
+fn integrator(
+    source: SourceText<'_>,
+    file: &DeTable<'_>,
+    is_discrete: bool,
+) -> Result<(Integrator, usize), EquationsError> {
+    let record = file
+        .get(RECORD)
+        .and_then(|value| value.get_ref().as_table());
+    let value = record.and_then(|record| record.get("integrator"));
+    let named = match value.and_then(|value| value.get_ref().as_str()) {
+        None => None,
+        Some("euler") => Some(Integrator::Euler),
+        Some("runge-kutta-4") => Some(Integrator::RungeKutta4),
+        Some("discrete") => Some(Integrator::Discrete),
+        Some(other) => {
+            let byte = value.map_or(0, |value| value.span().start);
+            let problem = format!(
+                "unknown integrator \"{}\"; there are euler, runge-kutta-4 and discrete",
+                excerpt(other)
+            );
+            return source.error(byte, problem);
+        }
+    };
+    let byte = value.map_or(0, |value| value.span().start);
+    let integrator = match (named, is_discrete) {
+        (None | Some(Integrator::Discrete), true) => Integrator::Discrete,
+        (Some(_), true) => {
+            return source.error(
+                byte,
+                "states that have next are discrete; leave out the integrator",
+            );
+        }
+        (Some(Integrator::Discrete), false) => {
+            return source.error(byte, "discrete is for states that have next, and these have a rate; choose another integrator");
+        }
+        (Some(other), false) => other,
+        (None, false) => Integrator::RungeKutta4,
+    };
+    // What a study says of substeps, the study checks.
+    let substeps = record.and_then(|record| number(record.get("substeps")?.get_ref()));
+    let substeps = substeps.filter(|n| (1.0..=crate::twin::MOST_SUBSTEPS as f64).contains(n));
+    Ok((integrator, substeps.map_or(1, |n| n as usize)))
+}
+
+/// Returns the tables of a twin as a file has them, without comments.
+fn written(file: &DeTable<'_>) -> String {
+    let mut text = String::new();
+    for table in TABLES {
+        let Some(value) = file.get(table) else {
+            continue;
+        };
+        match value.get_ref() {
+            DeValue::Table(entries) => {
+                text += &format!("[{table}]\n");
+                let mut entries: Vec<_> = entries.iter().collect();
+                entries.sort_by_key(|(key, _)| key.span().start);
+                for (key, value) in entries {
+                    let (key, value) = (toml_key(key.get_ref()), inline(value.get_ref()));
+                    text += &format!("{key} = {value}\n");
+                }
+                text.push('\n');
+            }
+            value => text += &format!("[{table}]\nname = {}\n\n", inline(value)),
+        }
+    }
+    text
+}
+
+fn toml_key(key: &str) -> String {
+    match !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+        true => key.to_owned(),
+        false => toml::Value::String(key.into()).to_string(),
+    }
+}
+
+/// Returns a value in one line.
+fn inline(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => toml::Value::String(text.to_string()).to_string(),
+        DeValue::Boolean(is_true) => is_true.to_string(),
+        DeValue::Float(number) => number.as_str().to_owned(),
+        DeValue::Array(all) => {
+            let all: Vec<String> = all.iter().map(|value| inline(value.get_ref())).collect();
+            format!("[{}]", all.join(", "))
+        }
+        DeValue::Table(entries) => {
+            let mut entries: Vec<_> = entries.iter().collect();
+            entries.sort_by_key(|(key, _)| key.span().start);
+            let all = entries.into_iter().map(|(key, value)| {
+                format!("{} = {}", toml_key(key.get_ref()), inline(value.get_ref()))
+            });
+            format!("{{ {} }}", all.collect::<Vec<_>>().join(", "))
+        }
+        other => number(other).unwrap_or(f64::NAN).to_string(),
+    }
+}

@@ -1,0 +1,288 @@
+//! Texts against the equations in Rust that they stand for, and texts that are wrong.
+
+use super::Equations;
+use crate::record::{Drive, Record, Signal};
+use crate::twin::{Composed, DigitalTwin, Noise, Now, StateSpace, Twin};
+use crate::twins::{CascadedTanks, TANKS, VAN_DER_POL, VanDerPol};
+
+#[path = "../../examples/rooms.rs"]
+#[allow(dead_code)]
+mod rooms;
+
+/// A twin in Rust, the same as text, the number of its inputs.
+fn pairs() -> Vec<(&'static str, Twin, Equations)> {
+    let text = |text| Equations::parse(text).unwrap();
+    let rooms = include_str!("../../examples/rooms.toml");
+    vec![
+        ("tanks", Twin::new(CascadedTanks), text(TANKS)),
+        ("van-der-pol", Twin::new(VanDerPol), text(VAN_DER_POL)),
+        ("rooms", Twin::new(rooms::Rooms), text(rooms)),
+    ]
+}
+
+fn drive(twin: &Twin, step: f64) -> Drive {
+    let inputs = twin.signals().inputs.len();
+    let u = Signal::from_shape_fn((200, inputs), |(k, j)| {
+        [0.9, 0.1, 2.0, 1.1][(k / 25 + j) % 4]
+    });
+    Drive::new(step, u).unwrap()
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-12 * (1.0 + a.abs())
+}
+
+#[test]
+fn reference_twins_and_their_texts_are_the_same() {
+    for (name, rust, text) in pairs() {
+        let outline = rust.outline().unwrap();
+        assert_eq!(outline, text.outline(), "{name}");
+        let (own, other) = (rust.equations().unwrap(), Composed::from(text.clone()));
+        assert_eq!(own.limits(), other.limits(), "{name}");
+        let (n, p) = (outline.states.len(), outline.outputs.len());
+        for point in 0..20 {
+            let noise = Noise::new(3, "texts", point);
+            let theta = outline.parameters.draw_prior(noise);
+            let mut source = noise.source("point");
+            let x: Vec<f64> = (0..9 * n).map(|_| 3.0 * source.normal()).collect();
+            let u: Vec<f64> = outline.inputs.iter().map(|_| source.uniform()).collect();
+            let now = Now::new(0.7, 0.05, &u, &theta);
+            // One point and nine of them: both ways through the tape.
+            for x in [&x[..n], &x[..]] {
+                let values = |twin: &Composed| {
+                    let (mut dx, mut y) = (vec![0.0; x.len()], vec![0.0; x.len() / n * p]);
+                    twin.drift(&now, x, &mut dx);
+                    twin.observe(&now, x, &mut y);
+                    let (mut q, mut r, mut start) = (vec![0.0; n], vec![0.0; p], vec![0.0; n]);
+                    twin.noise(&now, &x[..n], &mut q, &mut r);
+                    twin.start(&now, &mut start);
+                    [dx, y, q, r, start].concat()
+                };
+                for (a, b) in values(own).iter().zip(values(&other)) {
+                    assert!(near(*a, b), "{name}: {a} {b}");
+                }
+            }
+        }
+        let drive = drive(&rust, 0.05);
+        let theta = outline.parameters.centre();
+        for noise in [Noise::OFF, Noise::new(1, "texts", 0)] {
+            let a = rust.simulate(&theta, &drive, noise).unwrap();
+            let b = text.simulate(&theta, &drive, noise).unwrap();
+            assert!(a.iter().zip(&b).all(|(a, b)| near(*a, *b)), "{name}");
+        }
+    }
+}
+
+/// Scores take the lanes, filters of larger twins the points: both see the same likelihood as in Rust.
+#[test]
+fn likelihoods_of_texts_are_those_of_rust() {
+    for (name, rust, text) in pairs() {
+        let step = if name == "van-der-pol" { 0.05 } else { 0.2 };
+        let drive = drive(&rust, step);
+        let theta = rust.parameters().centre();
+        let outputs = rust
+            .simulate(&theta, &drive, Noise::new(2, "texts", 0))
+            .unwrap();
+        let record = Record::new(drive, outputs).unwrap();
+        let study = |twin: Twin| crate::study::Study::of(twin).unwrap();
+        let fit = |twin: Twin| study(twin).fit(std::slice::from_ref(&record)).unwrap();
+        let (a, b) = (fit(rust), fit(Twin::new(text)));
+        let log_z = |fit: crate::fit::Fit| fit.evidence.unwrap().log_evidence;
+        let (a, b) = (log_z(a), log_z(b));
+        assert!((a - b).abs() <= 1e-6 * a.abs(), "{name}: {a} {b}");
+    }
+}
+
+fn problem(text: &str) -> String {
+    Equations::parse(text).unwrap_err().to_string()
+}
+
+/// A text whose states and outputs are given.
+fn with(tables: &str) -> String {
+    format!("[parameters]\nk = {{ prior = [0.1, 1.0] }}\n{tables}")
+}
+
+const OUTPUT: &str = "[outputs]\ny = { value = \"h\" }\n";
+
+#[test]
+fn faults_are_one_line_with_their_place() {
+    for (tables, expected) in [
+        (
+            "[states]\nh = { rate = \"-kk*h\" }\n",
+            "line 4, column 16: unknown name \"kk\" (did you mean \"k\"?)",
+        ),
+        (
+            "[states]\nh = { rate = \"-k*(h\" }\n",
+            "line 4, column 20: the expression ends",
+        ),
+        (
+            "[states]\nh = { rate = '''\n-k*h + sinn(h)''' }\n",
+            "line 5, column 8: unknown function \"sinn\" (did you mean \"sin\"?)",
+        ),
+        (
+            "[states]\nh = { rate = \"1\", nois = 1 }\n",
+            "line 4, column 19: unknown key \"nois\" (did you mean \"noise\"?)",
+        ),
+        (
+            "[states]\nk = { rate = \"1\" }\n",
+            "\"k\" is in parameters already",
+        ),
+        (
+            "[states]\nsin = { rate = \"1\" }\n",
+            "\"sin\" is a word of expressions",
+        ),
+        (
+            "[states]\n\"h-1\" = { rate = \"1\" }\n",
+            "cannot stand in an expression",
+        ),
+        (
+            "[define]\na = \"b + 1\"\nb = \"2*a\"\n[states]\nh = { rate = \"a\" }\n",
+            "a definition in a circle: ",
+        ),
+        (
+            "[constants]\ng = \"2*k\"\n[states]\nh = { rate = \"g\" }\n",
+            "g is no constant",
+        ),
+        (
+            "[states]\nh = { rate = \"1\", next = \"2\" }\n",
+            "h has rate and next",
+        ),
+        ("[states]\nh = { unit = \"m\" }\n", "h has no rate"),
+        ("[states]\nh = { rate = \"y\" }\n", "\"y\" is an output"),
+        (
+            "[states]\nh = { rate = \"1\", start = \"h\" }\n",
+            "a start can name parameters",
+        ),
+        (
+            "[states]\nh = { rate = \"1\", noise = -0.1 }\n",
+            "a standard deviation is 0 or more",
+        ),
+        (
+            "[states]\nh = { rate = \"1\", limits = [2, 1] }\n",
+            "low must be below high",
+        ),
+        (
+            "[states]\nh = { rate = true }\n",
+            "rate of h is a number or an expression",
+        ),
+        (
+            "[states]\nh = { rate = \"1\" }\n[record]\nintegrator = \"stiff\"\n",
+            "there are euler, runge-kutta-4 and discrete",
+        ),
+        (
+            "[states]\nh = { rate = \"1\" }\n[event]\n",
+            "\"event\" is no table of a twin",
+        ),
+        (
+            "[states]\nh = { rate = \"1\" }\n[inputs]\nu = { hold = \"impulse\" }\n",
+            "hold of u is",
+        ),
+        (
+            "[states]\nh = { rate = \"a < b < 1\" }\n",
+            "a second comparison",
+        ),
+        ("", "the twin has no states"),
+    ] {
+        let error = problem(&with(&format!("{tables}{OUTPUT}")));
+        assert!(error.contains(expected), "{tables}: {error}");
+        assert!(!error.contains('\n'), "{error}");
+    }
+}
+
+#[test]
+fn constants_fold_and_definitions_come_in_any_order() {
+    let text = with(
+        "[constants]\ng = 9.81\ntwice = \"2*g\"\n[define]\nb = \"a*twice\"\na = \"k*if(h > 1, 2, 3)\"\n\
+         [states]\nh = { rate = \"b - t\", start = \"2*k\", noise = \"0.1*abs(h)\", limits = [0, \"4*k\"] }\n\
+         [outputs]\ny = { value = \"min(h, 5, pi)\", noise = { std = 0.2, known = true } }\n",
+    );
+    let twin = Equations::parse(&text).unwrap();
+    let theta = [0.5];
+    let now = Now::new(3.0, 0.25, &[], &theta);
+    let mut dx = [0.0];
+    for (h, factor) in [(0.5, 3.0), (1.5, 2.0)] {
+        StateSpace::drift(&twin, &now, &[h], &mut dx);
+        assert!(near(dx[0], 0.5 * factor * 2.0 * 9.81 - 3.0));
+    }
+    let (mut start, mut q, mut r, mut y) = ([0.0], [0.0], [0.0], [0.0]);
+    StateSpace::start(&twin, &now, &mut start);
+    StateSpace::noise(&twin, &now, &[-2.0], &mut q, &mut r);
+    StateSpace::observe(&twin, &now, &[4.0], &mut y);
+    assert_eq!(
+        (start, q, r, y),
+        ([1.0], [0.2], [0.2], [std::f64::consts::PI])
+    );
+    let mut h = [7.0];
+    StateSpace::constrain(&twin, &now, &mut h);
+    assert_eq!(h, [2.0], "the limit follows a parameter");
+    assert!(twin.declared().known.contains("y") && twin.declared().estimated.is_empty());
+    // What is written is read again.
+    let again = Equations::parse(twin.text()).unwrap();
+    assert_eq!(
+        (again.text(), again.outline()),
+        (twin.text(), twin.outline())
+    );
+}
+
+/// A logistic map, and a force on it: one value a sample, whatever the step.
+#[test]
+fn next_is_the_value_at_the_next_sample() {
+    let text = "[parameters]\nr = { prior = [1.0, 4.0] }\n[states]\nx = { next = \"r*x*(1 - x)\", start = 0.3 }\n[outputs]\ny = { value = \"x\" }\n";
+    let twin = Equations::parse(text).unwrap();
+    let y = twin
+        .simulate(&[3.2], &Drive::autonomous(0.5, 20).unwrap(), Noise::OFF)
+        .unwrap();
+    let mut x = 0.3;
+    for y in &y {
+        assert!((y - x).abs() < 1e-13);
+        x *= 3.2 * (1.0 - x);
+    }
+    assert!(
+        problem(&format!("{text}[record]\nintegrator = \"euler\"\n"))
+            .contains("leave out the integrator")
+    );
+}
+
+/// Random changes of good texts: read or refused in a line, and what is read computes without a panic.
+#[test]
+fn texts_that_are_nearly_right_do_no_harm() {
+    const PIECES: [&str; 24] = [
+        "(", ")", "^", "-", "if(", ",", "1e308", "\"", "h1", "k9", "[", "]", "{", "}", "=", "\n",
+        "and", "0", "\u{200b}", "θ", "mod(", "inf", "nan", "not ",
+    ];
+    let mut accepted = 0;
+    for sample in 0..600 {
+        let mut source = Noise::new(5, "texts", sample).source("change");
+        let mut text = [TANKS, VAN_DER_POL][sample as usize % 2].to_owned();
+        for _ in 0..1 + sample % 3 {
+            let mut at = (source.uniform() * text.len() as f64) as usize;
+            while !text.is_char_boundary(at) {
+                at -= 1;
+            }
+            let piece = PIECES[(source.uniform() * PIECES.len() as f64) as usize];
+            if source.happens(0.3) {
+                let end = (at..=text.len()).find(|end| *end > at && text.is_char_boundary(*end));
+                text.replace_range(at..end.unwrap_or(at), piece);
+            } else {
+                text.insert_str(at, piece);
+            }
+        }
+        match Equations::parse(
+            &text
+                .replace("samples", "#")
+                .replace("input =", "#")
+                .replace("step =", "#"),
+        ) {
+            Ok(twin) => {
+                accepted += 1;
+                let inputs = twin.outline().inputs.len();
+                let drive = Drive::new(0.1, Signal::ones((5, inputs))).unwrap();
+                let theta = twin.outline().parameters.centre();
+                // It may diverge.
+                let _ = twin.simulate(&theta, &drive, Noise::OFF);
+            }
+            Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
+        }
+    }
+    assert!(accepted > 10, "{accepted}");
+}

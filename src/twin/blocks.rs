@@ -1,0 +1,21 @@
+//! Equations that take all points of a step in one call.
+
+use crate::math::Lanes;
+use crate::twin::Now;
+
+/// Equations that are faster for many points in one call than for one after the other: each choice of what to compute is paid once.
+///
+/// They have no memories, constraints or readout of their own: [`StateSpace`](crate::twin::StateSpace) says these one by one.
+pub trait Blocks: Send + Sync {
+    /// Sets `dx` to the rates of points, `stride` numbers from one to the next in both.
+    fn drift(&self, now: &Now<'_>, stride: usize, x: &[f64], dx: &mut [f64]);
+
+    /// Sets `y` to the outputs of points, `stride` numbers from one to the next in `x`.
+    fn observe(&self, now: &Now<'_>, stride: usize, x: &[f64], y: &mut [f64]);
+
+    /// Carries the points of several filters, one a lane, over one step of Euler's rule.
+    fn step_lanes(&self, now: &[Now<'_>], x: &mut [Lanes]);
+
+    /// Sets `y` to the one output of these points.
+    fn observe_lanes(&self, now: &[Now<'_>], x: &[Lanes], y: &mut [Lanes]);
+}
