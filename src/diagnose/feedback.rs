@@ -4,21 +4,23 @@
 //! explains that noise, and passes for a gap. Of each input and output
 //!
 //! ```text
-//! u_k = a + b·u_{k−1} + c·u_{k−2} + d·e_k + f·e_{k−1} + g·e_{k−2}        e: innovations of the output
+//! u_k = a + Σ b_l·u_{k−l} + c·e_k + Σ d_l·e_{k−l},   l = 1 … 4        e: innovations of the output
 //! ```
 //!
-//! is fitted. The input holds the noise where d is clear. That of a controller is told from one that acts on a sensor by itself by the
-//! innovations of rows before, which say nothing of the future of an input that nothing feeds back to: f or g must be clear as well.
+//! is fitted. The input holds the noise where c is clear. A controller is told from an input that acts on a sensor by itself by the innovations
+//! of rows before, which say nothing of the future of an input that nothing feeds back to: all d together must be clear as well. Each is
+//! judged by n·ln(RSS₀/RSS), about χ² where it is zero.
 
 use crate::hypothesis::term::Term;
 use crate::likelihood::kalman::Filtered;
 use crate::record::Record;
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Standard errors from which d, and f or g, are clear: one record in 16 000 of an open loop has as large ones, of each.
-const CLEAR: f64 = 4.0;
-/// Rows before that are looked at.
-const BEFORE: usize = 2;
+/// Level of both tests: chance takes one open loop in 10⁴ for a closed one, of inputs that also hold the noise by chance.
+const LEVEL: f64 = 1e-4;
+/// Rows before that are looked at: twice hardly shows more of a state that a few rows tell; half misses a derivative's.
+const BEFORE: usize = 4;
 
 /// Names of inputs that react to an output of the same row.
 pub(super) fn reacting(
@@ -50,25 +52,29 @@ fn responds(filtered: &[Filtered], records: &[Record], i: usize, j: usize) -> bo
             }
         }
     }
-    let columns = 2 * BEFORE + 2;
-    let x = DMatrix::from_row_iterator(inputs.len(), columns, rows);
-    let Some(t) = tested(&x, DVector::from_vec(inputs)) else {
+    let (own, all) = (BEFORE + 1, 2 * BEFORE + 2);
+    let x = DMatrix::from_row_iterator(inputs.len(), all, rows);
+    let y = DVector::from_vec(inputs);
+    let rests = [own, own + 1, all].map(|columns| rest(&x.columns(0, columns).into_owned(), &y));
+    let [Some(own), Some(noise), Some(before)] = rests else {
         return false;
     };
-    let before = t.rows(columns - BEFORE, BEFORE).amax();
-    t[columns - BEFORE - 1].abs().min(before) > CLEAR
+    let is_clear = |without: f64, with: f64, freedom: usize| {
+        let limit = ChiSquared::new(freedom as f64).map(|chi| chi.inverse_cdf(1.0 - LEVEL));
+        limit.is_ok_and(|limit| y.len() as f64 * (without / with).ln() > limit)
+    };
+    is_clear(own, noise, 1) && is_clear(noise, before, BEFORE)
 }
 
-/// Coefficients of a linear regression over their standard errors; `None` where columns depend on each other.
-fn tested(x: &DMatrix<f64>, y: DVector<f64>) -> Option<DVector<f64>> {
-    let freedom = y.len().checked_sub(x.ncols() + 1)?.max(1) as f64;
-    let inverse = (x.transpose() * x).cholesky()?.inverse();
-    let b = &inverse * x.transpose() * &y;
+/// Sum of squares that a linear regression leaves; `None` where columns depend on each other, or there are too few rows.
+fn rest(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<f64> {
+    if y.len() <= 2 * x.ncols() {
+        return None;
+    }
+    let b = (x.transpose() * x).cholesky()?.solve(&(x.transpose() * y));
     // An input that follows an output exactly leaves rounding errors.
-    let exact = (y.amax() * f64::EPSILON).powi(2);
-    let variance = ((&y - x * &b).norm_squared() / freedom).max(exact);
-    let t = |c: usize| b[c] / (variance * inverse[(c, c)]).sqrt();
-    Some(DVector::from_fn(x.ncols(), |c, _| t(c)))
+    let exact = y.norm_squared() * f64::EPSILON;
+    Some((y - x * b).norm_squared().max(exact))
 }
 
 /// Returns whether a term is a function of a reacting input at a sensor.
