@@ -48,10 +48,10 @@ fn rarely_accused(records: u64) {
     assert!(alarms <= most, "{alarms} of {records}, at most {most}");
 }
 
-/// At most 3 alarms: a version that accuses one perfect twin in five fails with a probability of 0.97.
+/// At most 2 alarms: a version that accuses one perfect twin in three fails with a probability of 0.98.
 #[test]
 fn a_perfect_twin_is_rarely_accused() {
-    rarely_accused(40);
+    rarely_accused(20);
 }
 
 /// At most 10 alarms: a version that accuses one perfect twin in twenty fails with a probability of 0.99.
