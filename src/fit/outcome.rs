@@ -60,6 +60,7 @@ pub struct Fit {
     #[serde(skip)]
     pub posterior: Option<Posterior>,
     /// Substeps, and the rule for inputs between samples, that the fit used in place of the twin's, as the records ask for; none otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub stepping: Option<Stepping>,
     /// Number of samples of all records.
     pub samples: usize,
