@@ -12,6 +12,7 @@ macro_rules! pages {
 pages! {
     Readme "../README.md",
     AddATwin "../docs/add-a-twin.md",
+    EquationsInAFile "../docs/equations.md",
     Estimating "../docs/estimating.md",
     Extending "../docs/extending.md",
 }

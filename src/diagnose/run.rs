@@ -2,8 +2,10 @@
 
 use super::outcome::Diagnosis;
 use super::report::Report;
-use super::search::{Watch, searched};
+use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
+use super::thresholds::Thresholds;
+use crate::likelihood::start_elsewhere;
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -47,7 +49,16 @@ pub fn diagnose(
     let clock = Instant::now();
     let study = &*study.for_records(records)?;
     check(study, records, validation, settings)?;
-    let found = searched(study, records, Watch { settings, progress })?;
+    let watch = Watch { settings, progress };
+    let trusting = study.trusting_starts();
+    let mut found = searched(study, records, watch)?;
+    let study = match trusted(&trusting, (study, &found), records, watch)? {
+        Some(better) => {
+            found = better;
+            &trusting
+        }
+        None => study,
+    };
     // What is left to do for a partial answer is done as for a quick look, without a share: that takes longest.
     let hurried = DiagnoseSettings {
         quick: true,
@@ -66,6 +77,25 @@ pub fn diagnose(
         seconds: clock.elapsed().as_secs_f64(),
         ..diagnosis
     })
+}
+
+/// Searches again with the start that the twin's code says, where a first row is another one and something is missing: what is missing may bend
+/// the reading of that start, as an offset does. `None` where log Z of all hypotheses is no better for it.
+fn trusted<'s>(
+    trusting: &'s Study,
+    (study, found): (&Study, &Search<Setup<'s>>),
+    records: &[Record],
+    watch: Watch<'s>,
+) -> Result<Option<Search<Setup<'s>>>, StudyError> {
+    let known = &found.known;
+    let is_explained = known.log_z() - known.twin().log_z <= Thresholds::GAP;
+    let beliefs = watch.settings.beliefs(study);
+    let elsewhere = start_elsewhere(study.twin(), records, &beliefs);
+    if found.is_partial || is_explained || elsewhere.is_none() {
+        return Ok(None);
+    }
+    let other = searched(trusting, records, watch)?;
+    Ok((other.known.log_z() > known.log_z()).then_some(other))
 }
 
 impl Study {

@@ -165,6 +165,7 @@ impl Study {
             known: own.known,
             factors: own.factors,
             estimated: own.estimated,
+            trusts_code: self.trusts_starts,
             wide: (starts.clone())
                 .filter(|(_, level)| !matches!(level, StartLevel::Declared { std: 0.0, .. }))
                 .map(|(name, _)| name.clone())

@@ -64,6 +64,8 @@ pub struct Study {
     text: Option<&'static str>,
     /// The library's effects and the study's own.
     catalogue: Catalogue,
+    /// `true` where the starts of the twin's code stand, whatever the first rows say.
+    trusts_starts: bool,
 }
 
 debug_by_name!(Study);
@@ -134,6 +136,7 @@ impl Study {
             demo: None,
             text: None,
             catalogue: Catalogue::default(),
+            trusts_starts: false,
         })
     }
 
@@ -148,6 +151,14 @@ impl Study {
     pub fn with_effects(mut self, kinds: impl IntoIterator<Item = EffectKind>) -> Self {
         self.catalogue = kinds.into_iter().fold(self.catalogue, Catalogue::with);
         self
+    }
+
+    /// The study of a twin whose starts in code stand, whatever the first rows of its records say.
+    pub(crate) fn trusting_starts(&self) -> Self {
+        Self {
+            trusts_starts: true,
+            ..self.clone()
+        }
     }
 
     /// With a record to show the program on, and the setting that the record is of.

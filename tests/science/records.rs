@@ -347,3 +347,21 @@ impl StateSpace for Decay {
         Integrator::RungeKutta4
     }
 }
+
+/// An offset of the sensor looks like another start, until the rest of the record is seen: the diagnosis asks both.
+#[test]
+fn an_offset_is_no_other_start() {
+    let inputs = Signal::from_shape_fn((160, 1), |(k, _)| [1.0, -0.6, 0.4, -1.0][k / 20 % 4]);
+    let drive = Drive::new(0.5, inputs).unwrap();
+    let run = Plant.simulate(&[2.0, 5.0], &drive, Noise::OFF).unwrap();
+    let mut source = Noise::new(8, "records", 0).source("v");
+    let offset = run.mapv(|y| y + 6.0 + 0.02 * source.normal());
+    let record = Record::new(drive, offset).unwrap();
+    let settings = DiagnoseSettings {
+        quick: true,
+        ..DiagnoseSettings::default()
+    };
+    let study = Study::of(Plant).unwrap();
+    let found = diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap();
+    assert_eq!(found.cause.accepted, ["sensor-bias@sensor"]);
+}

@@ -40,6 +40,8 @@ pub(crate) struct Beliefs {
     pub wide: BTreeSet<String>,
     /// States whose start is to be estimated, whatever the code says.
     pub estimated: BTreeSet<String>,
+    /// `true` where the code's word on starts stands, whatever the first rows say.
+    pub trusts_code: bool,
 }
 
 /// An output whose first value is not that of the start.

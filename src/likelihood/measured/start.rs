@@ -43,7 +43,7 @@ impl Starts {
             })
             .collect();
         let mut elsewhere = None;
-        for (r, record) in records.iter().enumerate() {
+        for (r, record) in (records.iter().enumerate()).filter(|_| !beliefs.trusts_code) {
             // Of records that begin at 0, the study's own word stands; at another time, it may be that of a start before the record.
             let stands = record.drive().first_time() == 0.0 || twin.begins().is_some();
             let given_up: Vec<usize> = (0..names.len())

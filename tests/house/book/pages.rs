@@ -23,7 +23,7 @@ fn every_page_is_listed() {
 #[test]
 fn the_book_is_short() {
     let book = pages().len() - OUTSIDE.len() - 1; // without SUMMARY
-    assert!(book <= 18, "{book} pages");
+    assert!(book <= 19, "{book} pages");
     let glossary = read(&root().join("docs/glossary.md"));
     let terms = glossary.lines().filter(|line| line.starts_with("| **"));
     assert!(terms.count() <= 40);
