@@ -6,7 +6,7 @@ use crate::twin::{Composed, DigitalTwin, Noise, Now, StateSpace, Twin};
 use crate::twins::{CascadedTanks, TANKS, VAN_DER_POL, VanDerPol};
 
 #[path = "../../examples/rooms.rs"]
-#[allow(dead_code)]
+#[allow(dead_code, clippy::duplicate_mod)]
 mod rooms;
 
 /// A twin in Rust, the same as text, the number of its inputs.

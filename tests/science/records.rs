@@ -301,7 +301,7 @@ fn rows_of_one_time_are_replicates() {
         let outputs = record.outputs().select(ndarray::Axis(0), &rows);
         Record::new(Drive::autonomous(0.4, 12).unwrap(), outputs).unwrap()
     };
-    let text = "twin = 'twin'\n[noise]\nx = { std = 0.0, known = true }\ny = { std = 0.1, known = true }\n";
+    let text = "twin = 'twin'\n[record]\nstep = 0.4\nsamples = 36\n[noise]\nx = { std = 0.0, known = true }\ny = { std = 0.1, known = true }\n";
     let known = configured(&study, text);
     let together = known.fit(std::slice::from_ref(&record)).unwrap();
     let apart = known.fit(&[third(0), third(1), third(2)]).unwrap();

@@ -62,7 +62,7 @@ impl LeadIn {
                 number(first_row)
             ));
         }
-        if !(steps <= MOST_BEFORE) {
+        if steps.is_nan() || steps > MOST_BEFORE {
             return Err(format!(
                 "the start belongs to {} s, {steps} steps before the first row at {} s; at most {MOST_BEFORE} are run: give a later time",
                 number(begun),

@@ -4,7 +4,7 @@
 #[allow(dead_code, unreachable_pub)]
 mod own_twin;
 #[path = "../../../../../examples/rooms.rs"]
-#[allow(dead_code, unreachable_pub)]
+#[allow(dead_code, unreachable_pub, clippy::duplicate_mod)]
 mod rooms;
 
 use super::*;
