@@ -81,6 +81,10 @@ impl Catalogue {
                         .filter(|(rate, _)| rate == target)
                         .map(|(_, of)| Some(of))
                         .collect(),
+                    Some(OtherState::RateOfOrItself) => {
+                        let of = rates.iter().find(|(rate, _)| rate == target);
+                        vec![Some(of.map_or(target, |(_, of)| of))]
+                    }
                     // The excess of a single vessel is lost.
                     Some(OtherState::To) if known.len() == 1 => vec![Some(target)],
                     Some(OtherState::From | OtherState::To) => rest().map(Some).collect(),
@@ -220,7 +224,7 @@ mod tests {
         let only = Catalogue::default().with(magnet().only_on(["h2"]));
         assert_eq!(keys(&only, &tanks), ["magnet@h2"]);
         assert!(keys(&only, &Twin::new(VanDerPol)).is_empty());
-        assert_eq!(only.with(magnet()).kinds().len(), 31, "one of an id");
+        assert_eq!(only.with(magnet()).kinds().len(), 38, "one of an id");
     }
 
     #[test]

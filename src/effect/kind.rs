@@ -3,7 +3,7 @@
 use super::law::{ForcePoint, NOISE_ENTERS};
 use super::magnitude::Magnitude;
 use super::marks::OutputMark;
-use crate::twin::{Law, Now, Outliers};
+use crate::twin::{Law, Now, Outliers, Remember};
 use std::fmt;
 use std::sync::Arc;
 
@@ -15,6 +15,8 @@ pub enum OtherState {
     From,
     /// The state whose rate the target is acts on it; `from` in files.
     RateOf,
+    /// The state whose rate the target is acts on it, or else the target itself; `from` in files.
+    RateOfOrItself,
     /// Any other state takes what the target loses, or none on a twin of one state; `to` in files.
     To,
 }
@@ -23,7 +25,7 @@ impl OtherState {
     /// Returns the key in files.
     pub fn key(self) -> &'static str {
         match self {
-            Self::From | Self::RateOf => "from",
+            Self::From | Self::RateOf | Self::RateOfOrItself => "from",
             Self::To => "to",
         }
     }
@@ -57,6 +59,7 @@ pub struct EffectKind {
     only_on: Option<Vec<String>>,
     order: u32,
     memory: usize,
+    follows: Option<Arc<dyn Remember>>,
     dead_time: bool,
     mark: Option<fn(&[f64]) -> OutputMark>,
     check: Option<MagnitudeCheck>,
@@ -156,6 +159,7 @@ impl EffectKind {
             only_on: None,
             order: 0,
             memory: 0,
+            follows: None,
             dead_time: false,
             mark: None,
             check: None,
@@ -180,6 +184,13 @@ impl EffectKind {
     #[must_use]
     pub fn memory(mut self, values: usize) -> Self {
         self.memory = values;
+        self
+    }
+
+    /// Gives a force a memory of its other state, or of its target where it has none: it moves once a sample.
+    #[must_use]
+    pub(super) fn follows(mut self, by: impl Remember + 'static) -> Self {
+        self.follows = Some(Arc::new(by));
         self
     }
 
@@ -266,7 +277,12 @@ impl EffectKind {
         self.order
     }
 
-    /// Number of memory values that a signal law needs.
+    /// Returns how the memory of a force moves, if it has one.
+    pub(crate) fn remembers(&self) -> Option<&Arc<dyn Remember>> {
+        self.follows.as_ref()
+    }
+
+    /// Number of memory values that a law needs.
     pub(crate) fn memory_values(&self) -> usize {
         self.memory
     }

@@ -18,6 +18,8 @@ pub struct ForcePoint<'a> {
     pub x: f64,
     /// The other state's value; 0 for a force without one.
     pub other: f64,
+    /// Values that the law remembers; empty for a force without memory.
+    pub memory: &'a [f64],
     /// Seconds from the first sample.
     pub t: f64,
     /// All states of the twin.
@@ -146,10 +148,13 @@ where
         (at, x): (Layout, &[f64]),
         dx: &mut [f64],
     ) {
-        for (states, rates) in at.each(x).zip(at.each_mut(dx)) {
+        let points = x.chunks_exact(at.stride);
+        for (all, rates) in points.zip(at.each_mut(dx)) {
+            let states = &all[..at.states];
             let point = ForcePoint {
                 x: states[on.target],
                 other: on.other.map_or(0.0, |j| states[j]),
+                memory: &all[on.memory.clone()],
                 t: now.t,
                 states,
                 u: now.u,

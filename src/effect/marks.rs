@@ -48,6 +48,14 @@ pub(crate) fn clipped(outputs: &[f64]) -> OutputMark {
     }
 }
 
+/// Mark of a range that is limited before the noise: none, and refuted by values that repeat at an end.
+pub(crate) fn unclipped(outputs: &[f64]) -> OutputMark {
+    match stops(outputs) {
+        true => OutputMark::Absent,
+        false => OutputMark::Unmarked,
+    }
+}
+
 /// Returns whether values are rounded so coarsely that most of them repeat.
 pub(crate) fn on_levels(outputs: &[f64]) -> bool {
     step_of(outputs).is_some() && 2 * distinct(outputs).len() <= outputs.len()

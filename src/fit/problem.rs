@@ -2,7 +2,7 @@
 
 use crate::fit::axis::{Axis, EvidencePrior, Family};
 use crate::fit::budget::Passes;
-use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, States};
+use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Responses, Score, States};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
 use crate::twin::{Noise, Outline, Parameter, ParameterSpace, Role, Stepping, Twin};
@@ -361,6 +361,14 @@ impl Problem {
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| self.counted().states(&self.of_record(r, theta), record))
+            .collect()
+    }
+
+    /// Responses of the predictions of each record to small additions inside the twin; empty for a black box.
+    pub fn responses(&self, theta: &[f64]) -> Result<Vec<Responses>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| self.counted().responses(&self.of_record(r, theta), record))
+            .filter_map(Result::transpose)
             .collect()
     }
 

@@ -121,6 +121,34 @@ impl Reference {
         &self.r
     }
 
+    /// Number of outputs.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Entry (i, j ≤ i) of the inverse root C⁻¹ of a row.
+    pub fn inverse_root(&self, row: usize, i: usize, j: usize) -> f64 {
+        let p = self.channels;
+        self.roots[(row * p + i) * p + j]
+    }
+
+    /// Directions of θ and r, without the rows of variances.
+    pub fn of_means(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let (rows, d) = self.directions.shape();
+        let directions = DMatrix::from_fn(rows / 2, d, |k, j| self.directions[(2 * k, j)]);
+        (directions, DVector::from_fn(rows / 2, |k, _| self.r[2 * k]))
+    }
+
+    /// Step of θ that its own directions ask for, in φ.
+    pub fn step(&self) -> &DVector<f64> {
+        &self.answer
+    }
+
+    /// Steps of θ that answer directions whose products with its own are given.
+    pub fn solved(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
+        self.factor.solve(products)
+    }
+
     /// Answer of θ to so many multiples of a direction: a step in φ.
     pub fn answer(&self, direction: &DVector<f64>, alpha: f64) -> DVector<f64> {
         &self.answer - self.factor.solve(&self.directions.tr_mul(direction)) * alpha

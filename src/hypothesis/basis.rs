@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
 /// Terms of a function of one variable. At the shortest length the last one has e^−2 of the first one's variance; half of them cannot
 /// turn as fast as a ceiling does, twice of them double the time.
-pub(super) const TERMS: usize = 10;
+pub(in crate::hypothesis) const TERMS: usize = 10;
 /// Most that the orders of a product of two add up to.
 const ORDER: usize = 7;
 const HIGHEST: usize = 6;
@@ -16,6 +16,8 @@ pub(crate) enum Of {
     State(usize),
     /// Input of this index.
     Input(usize),
+    /// Output of this index, as the twin's own equations show it; only its trace is a variable.
+    Output(usize),
     /// The signal that passes a sensor or actuator.
     Signal,
     /// Time in seconds.
@@ -28,7 +30,7 @@ impl Of {
         match self {
             Self::State(i) => states[i],
             Self::Input(i) => inputs[i],
-            Self::Signal => signal,
+            Self::Signal | Self::Output(_) => signal,
             Self::Time => time,
         }
     }
@@ -39,6 +41,13 @@ pub(super) fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (1..=HIGHEST)
         .flat_map(|i| (1..=HIGHEST).map(move |j| (i, j)))
         .filter(|(i, j)| i + j <= ORDER)
+}
+
+/// The terms of a function of one variable where it is `value`.
+pub(in crate::hypothesis) fn terms_of_one(value: f64, ends: (f64, f64)) -> [f64; TERMS] {
+    let mut phi = [0.0; TERMS];
+    sines(value, ends, &mut phi);
+    phi
 }
 
 /// √2·sin(kπz) for k = 1… into `out`, z = (value − a)/(b − a) held in [0, 1].

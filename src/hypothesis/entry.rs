@@ -1,33 +1,80 @@
 //! Disturbances and unknown functions of states, inputs and time as parts of a twin.
 
 use super::basis::{Of, TERMS, sum_of_one};
+use super::trace::Trace;
 pub(crate) use crate::twin::Entry;
 use crate::twin::{
-    Disturbance, LARGEST, Law, LawPart, LawPlace, Layout, Now, Parameter, ParameterChange, Role,
-    SignalChange, Twin, TwinPart,
+    Disturbance, Follows, LARGEST, Law, LawPart, LawPlace, Layout, Now, Parameter, ParameterChange,
+    RateChange, Role, Seen, SignalChange, Twin, TwinPart,
 };
 use std::sync::Arc;
 
 /// A function, where it enters, and the range that it is drawn over.
 ///
 /// ```text
-/// y_j + f(z)   or   θ_i·exp(f(z))        z: a state, an input or time
+/// y_j + f(z),   θ_i·exp(f(z))   or   ẋ_i + f(z)        z: a state, an input or time, or a trace of one
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Entered {
-    /// A sensor or a parameter.
+    /// A sensor, a parameter or, for a trace, a state.
     pub entry: Entry,
     pub of: Of,
     pub ends: (f64, f64),
+    /// Trace of the variable that the function is of, where it is not of the variable itself.
+    pub trace: Option<Trace>,
 }
 
-impl Entered {
+/// A function in its place: the state that holds the trace, if it is of one.
+#[derive(Clone, Copy)]
+struct Placed {
+    function: Entered,
+    memory: usize,
+}
+
+impl Placed {
+    /// The function behind the memories of the step, which hold the traces of its sample.
     fn value(&self, m: &[f64], now: &Now<'_>, x: &[f64], signal: f64) -> f64 {
-        sum_of_one(m, self.of.value(now.t, x, now.u, signal), self.ends)
+        let Entered {
+            of, ends, trace, ..
+        } = self.function;
+        let variable = match trace {
+            Some(_) => x[self.memory],
+            None => of.value(now.t, x, now.u, signal),
+        };
+        sum_of_one(m, variable, ends)
+    }
+
+    /// The function before the memories of the step have moved: as an output is read.
+    fn reading(&self, m: &[f64], now: &Now<'_>, x: &[f64], signal: f64) -> f64 {
+        let Entered {
+            of, ends, trace, ..
+        } = self.function;
+        let value = of.value(now.t, x, now.u, signal);
+        let variable = match trace {
+            Some(trace) => trace.step(x[self.memory], value, now.dt),
+            None => value,
+        };
+        sum_of_one(m, variable, ends)
     }
 }
 
-impl SignalChange for Entered {
+impl RateChange for Placed {
+    fn push(
+        &self,
+        m: &[f64],
+        now: &Now<'_>,
+        on: &LawPlace,
+        (at, x): (Layout, &[f64]),
+        dx: &mut [f64],
+    ) {
+        let points = x.chunks_exact(at.stride);
+        for (x, rates) in points.zip(dx.chunks_exact_mut(at.stride)) {
+            rates[on.target] += self.value(m, now, x, 0.0);
+        }
+    }
+}
+
+impl SignalChange for Placed {
     fn peek(
         &self,
         m: &[f64],
@@ -38,18 +85,18 @@ impl SignalChange for Entered {
     ) {
         for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
             let signal = &mut y[on.target];
-            *signal += self.value(m, now, x, *signal);
+            *signal += self.reading(m, now, x, *signal);
         }
     }
 }
 
-impl ParameterChange for Entered {
+impl ParameterChange for Placed {
     fn value(&self, m: &[f64], now: &Now<'_>, x: &[f64], value: f64) -> f64 {
         value * self.value(m, now, x, 0.0).clamp(-LARGEST, LARGEST).exp()
     }
 
     fn sees_states(&self) -> bool {
-        matches!(self.of, Of::State(_))
+        matches!(self.function.of, Of::State(_)) || self.function.trace.is_some()
     }
 }
 
@@ -58,15 +105,35 @@ pub(crate) fn with_function(twin: &Twin, function: Entered) -> Twin {
     let coefficients = (1..=TERMS).map(|k| {
         Parameter::new(&format!("function/{k}"), "", -1.0, 1.0).with_role(Role::Magnitude)
     });
-    let (law, magnitudes) = (Arc::new(function), twin.entries()..twin.entries() + TERMS);
+    let memory = twin.outline().map_or(0, |outline| outline.states.len());
+    let law = Arc::new(Placed { function, memory });
+    let magnitudes = twin.entries()..twin.entries() + TERMS;
     let (law, target) = match function.entry {
         Entry::Sensor(target) => (Law::Sensor(law), target),
         Entry::Parameter(i) => (Law::Parameter(law), twin.entry(i)),
-        // Rates and inputs have functions that are effects.
-        Entry::State(_) | Entry::Actuator(_) => return twin.clone(),
+        Entry::State(target) => (Law::Force(law), target),
+        // Inputs have functions that are effects.
+        Entry::Actuator(_) => return twin.clone(),
     };
-    let part = LawPart::new(law, "function".into(), target, magnitudes);
+    let mut part = LawPart::new(law, format!("function/{memory}"), target, magnitudes);
+    if let Some((trace, of)) = function.trace.zip(seen(function.of)) {
+        part.memory = 1;
+        part.follows = Some(Follows {
+            of,
+            by: Arc::new(trace),
+        });
+    }
     twin.with(coefficients, vec![TwinPart::Law(part)])
+}
+
+/// Signal inside a twin that a variable is.
+fn seen(of: Of) -> Option<Seen> {
+    match of {
+        Of::State(i) => Some(Seen::State(i)),
+        Of::Input(i) => Some(Seen::Input(i)),
+        Of::Output(j) => Some(Seen::Output(j)),
+        Of::Signal | Of::Time => None,
+    }
 }
 
 /// Returns the twin with an Ornstein–Uhlenbeck disturbance, θ longer by its strength σ > 0: what an effect that nobody listed would look
@@ -110,6 +177,7 @@ mod tests {
             entry: Entry::Sensor(0),
             of: Of::Input(0),
             ends: (0.0, 4.0),
+            trace: None,
         };
         let twin = with_function(&base, function);
         let mut longer = [&THETA[..], &[0.0; TERMS]].concat();
@@ -139,6 +207,7 @@ mod tests {
                 entry: Entry::Parameter(3),
                 of,
                 ends: (0.0, 4.0),
+                trace: None,
             };
             with_function(&base, function)
                 .free_run(&theta, &drive)
@@ -160,7 +229,14 @@ mod tests {
         let drive = Drive::new(0.5, inputs).unwrap();
         let ends = (0.0, 30.0);
         let base = Twin::new(AtOnce::<1>(|a, u| a[0] * a[0] * u));
-        let twin = with_function(&base, Entered { entry, of, ends });
+        let trace = None;
+        let function = Entered {
+            entry,
+            of,
+            ends,
+            trace,
+        };
+        let twin = with_function(&base, function);
         let theta = [&[0.8, first][..], &[0.0; TERMS - 1]].concat();
         let outputs = twin.simulate(&theta, &drive, Noise::new(1, "test", 0));
         (drive, outputs.unwrap())

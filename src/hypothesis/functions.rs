@@ -12,8 +12,10 @@
 use super::basis::{Of, TERMS, pairs, sum_of_one, sum_of_two};
 use super::entry::{Entered, Entry};
 use super::term::{Nature, Part, Start, Term};
-use crate::effect::{Effect, EffectKind, Magnitude, Shape, clamp, lag};
+use super::trace::{Trace, Trail};
+use crate::effect::{Effect, EffectKind, Magnitude, Shape, lag};
 use crate::fit::axis::{Axis, EvidencePrior};
+use crate::math::quantile;
 use crate::twin::{Interval, Now, Parameter};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -25,6 +27,9 @@ const LENGTHS_OF_TWO: [f64; 2] = [0.3, 0.7];
 const MARGIN: f64 = 0.2;
 /// Time constants that a signal's past is seen through, in seconds, from a few steps to a part of the record.
 pub(super) const PASTS: usize = 4;
+
+/// Most states for which functions of any two are rivals; beyond, only those with the state's own value.
+pub(super) const MOST_STATES: usize = 4;
 
 /// Names of coefficients: effects name their magnitudes before any record is seen.
 static NAMES: [&str; 21] = [
@@ -48,6 +53,21 @@ impl Variable {
             .max(f64::MIN_POSITIVE);
         (self.low - MARGIN * span, self.high + MARGIN * span)
     }
+}
+
+/// Range that lists of values cover, but for a hundredth of each; `None` where nothing moves.
+pub(super) fn visited(all: impl Iterator<Item = Vec<f64>>) -> Option<(f64, f64)> {
+    let at = |values: &[f64], p| quantile(values, p).unwrap_or(f64::NAN);
+    let ends = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), values| {
+        (low.min(at(&values, 0.005)), high.max(at(&values, 0.995)))
+    });
+    (ends.0 < ends.1).then_some(ends)
+}
+
+/// Values from low to high, evenly in their logarithm.
+pub(super) fn spread<const N: usize>(low: f64, high: f64) -> [f64; N] {
+    let high = high.max(2.0 * low);
+    std::array::from_fn(|i| low * (high / low).powf(i as f64 / (N - 1) as f64))
 }
 
 /// Weights of the coefficients for each length.
@@ -120,6 +140,7 @@ fn term(
         variables,
         mark: 0.0,
         also: vec![],
+        trail: None,
         part: Part::Effect {
             effect,
             held: BTreeMap::new(),
@@ -215,18 +236,50 @@ pub(super) fn of_signal(target: &str, is_sensor: bool, variable: &Variable, larg
 /// An unknown function of a state, an input or time that is added to an output, or to the logarithm of a parameter.
 pub(super) fn entered(target: &str, entry: Entry, variable: &Variable, largest: f64) -> Term {
     let ends = variable.ends();
+    let function = Entered {
+        entry,
+        of: variable.of,
+        ends,
+        trace: None,
+    };
     Term {
-        id: format!("f({})", variable.name),
-        target: target.into(),
         nature: match entry {
             Entry::Sensor(_) => Nature::Reading,
             _ => Nature::Function,
         },
-        part: Part::Function(Entered {
-            entry,
-            of: variable.of,
-            ends,
-        }),
+        variables: vec![(variable.name.clone(), ends.0, ends.1)],
+        ..of_part(target, &variable.name, function, largest)
+    }
+}
+
+/// An unknown function of what a state, an input or an output leaves behind, added to a rate, an output or the logarithm of a parameter;
+/// `variable` is the trace.
+pub(super) fn of_trail(
+    target: &str,
+    entry: Entry,
+    variable: &Variable,
+    largest: f64,
+    trace: Trace,
+) -> Term {
+    let function = Entered {
+        entry,
+        of: variable.of,
+        ends: variable.ends(),
+        trace: Some(trace),
+    };
+    Term {
+        trail: Some(Trail::new(entry, variable.of, trace, variable.ends())),
+        ..of_part(target, &variable.name, function, largest)
+    }
+}
+
+/// An unknown function that is a part of the twin, of a variable of this name.
+fn of_part(target: &str, name: &str, function: Entered, largest: f64) -> Term {
+    Term {
+        id: format!("f({name})"),
+        target: target.into(),
+        nature: Nature::Past,
+        part: Part::Function(function),
         entries: None,
         axes: vec![coefficient(largest); TERMS],
         family: Some((weights(1), largest)),
@@ -234,9 +287,10 @@ pub(super) fn entered(target: &str, entry: Entry, variable: &Variable, largest: 
             m: vec![0.0; TERMS],
             scales: false,
         }],
-        variables: vec![(variable.name.clone(), ends.0, ends.1)],
+        variables: vec![],
         mark: 0.0,
         also: vec![],
+        trail: None,
     }
 }
 
@@ -261,88 +315,80 @@ pub(super) fn of_past(target: &str, is_sensor: bool, name: &str, times: [f64; PA
     )
 }
 
-/// Value that a signal leaves behind.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Trace {
-    /// That of a first-order lag of so many seconds.
-    Lag(f64),
-    /// That of a play: it follows at this distance.
-    Play(f64),
-}
-
-impl Trace {
-    /// The value after z, the signal being s.
-    pub fn next(self, mut z: f64, s: f64, dt: f64) -> f64 {
-        match self {
-            Self::Lag(tau) => lag(tau, dt, &mut z, s),
-            Self::Play(distance) => clamp(z, s - distance, s + distance),
-        }
-    }
-
-    /// The trace of a list of values.
-    pub fn of(self, values: &[f64], dt: f64) -> Vec<f64> {
-        let first = values.first().copied().unwrap_or(f64::NAN);
-        let follow = |z: &mut f64, s: &f64| {
-            *z = self.next(*z, *s, dt);
-            Some(*z)
-        };
-        values.iter().scan(first, follow).collect()
-    }
-}
-
-/// An unknown function of what a signal leaves behind: s + f(z); `variable` is z.
+/// An unknown function of what a signal leaves behind: s + f(z); `variable` is z, `trail` the same inside the twin.
 pub(super) fn of_trace(
     target: &str,
-    is_sensor: bool,
     variable: &Variable,
     largest: f64,
     trace: Trace,
+    entry: Entry,
 ) -> Term {
     let id = format!("f({})", variable.name);
     let ends = variable.ends();
     let law = move |m: &[f64], now: &Now<'_>, memory: &mut [f64], s: f64| {
-        memory[0] = trace.next(memory[0], s, now.dt);
+        memory[0] = trace.step(memory[0], s, now.dt);
         s + sum_of_one(m, memory[0], ends)
     };
     let formulas = ["s + f(trace of s)", "u + f(trace of u)"];
-    term(
-        passing(&id, is_sensor, formulas, TERMS, law).memory(1),
-        target,
-        Nature::Past,
-        weights(1),
-        largest,
-        vec![],
-    )
+    let (is_sensor, of) = match entry {
+        Entry::Sensor(j) => (true, Of::Output(j)),
+        Entry::Actuator(i) | Entry::State(i) | Entry::Parameter(i) => (false, Of::Input(i)),
+    };
+    Term {
+        trail: Some(Trail::new(entry, of, trace, ends)),
+        ..term(
+            passing(&id, is_sensor, formulas, TERMS, law).memory(1),
+            target,
+            Nature::Past,
+            weights(1),
+            largest,
+            vec![],
+        )
+    }
 }
 
 /// A wave of unknown size, phase and frequency: on a signal, a rate or, relative, a parameter.
 pub(super) fn wave(kind: &str, target: &str, largest: f64, frequency: Axis) -> Term {
-    const ID: &str = "periodic";
-    use std::f64::consts::TAU;
-    let wave = |m: &[f64], t: f64| {
-        let (sin, cos) = (TAU * m[2] * t).sin_cos();
+    let effect = waving(kind, "periodic", |m| m[2])
+        .magnitude(Magnitude::positive("frequency", "Hz", &[0.1]).shape(Shape::Frequency));
+    let weights = vec![vec![0.5; 2]];
+    let mut term = term(effect, target, Nature::Periodic, weights, largest, vec![]);
+    term.axes[2] = frequency;
+    term
+}
+
+/// A wave of unknown size and phase at a frequency in Hz of a signal, or at one of its harmonics.
+pub(super) fn locked_wave(
+    kind: &str,
+    target: &str,
+    signal: &str,
+    largest: f64,
+    frequency: f64,
+) -> Term {
+    let effect = waving(kind, &format!("response({signal})"), move |_| frequency);
+    let weights = vec![vec![0.5; 2]];
+    term(effect, target, Nature::Past, weights, largest, vec![])
+}
+
+/// Kind of a wave of two coefficients.
+fn waving(
+    kind: &str,
+    id: &str,
+    frequency: impl Fn(&[f64]) -> f64 + Send + Sync + 'static,
+) -> EffectKind {
+    let wave = move |m: &[f64], t: f64| {
+        let (sin, cos) = (2.0 * PI * frequency(m) * t).sin_cos();
         m[0] * sin + m[1] * cos
     };
     let effect = match kind {
-        "sensor" => EffectKind::sensor(ID, "s + wave", move |m, now, _, s| s + wave(m, now.t)),
-        "actuator" => EffectKind::actuator(ID, "u + wave", move |m, now, _, u| u + wave(m, now.t)),
-        "state" => EffectKind::force(ID, "ẋ + wave", move |m, at| wave(m, at.t)),
-        _ => EffectKind::parameter(ID, "θ·(1 + wave)", move |m, t, value| {
+        "sensor" => EffectKind::sensor(id, "s + wave", move |m, now, _, s| s + wave(m, now.t)),
+        "actuator" => EffectKind::actuator(id, "u + wave", move |m, now, _, u| u + wave(m, now.t)),
+        "state" => EffectKind::force(id, "ẋ + wave", move |m, at| wave(m, at.t)),
+        _ => EffectKind::parameter(id, "θ·(1 + wave)", move |m, t, value| {
             value * (1.0 + wave(m, t)).max(0.0)
         }),
     };
-    let effect = with_coefficients(effect, 2)
-        .magnitude(Magnitude::positive("frequency", "Hz", &[0.1]).shape(Shape::Frequency));
-    let mut term = term(
-        effect,
-        target,
-        Nature::Periodic,
-        vec![vec![0.5; 2]],
-        largest,
-        vec![],
-    );
-    term.axes[2] = frequency;
-    term
+    with_coefficients(effect, 2)
 }
 
 #[cfg(test)]
@@ -359,19 +405,5 @@ mod tests {
         }
         let lists = weights(1);
         assert!(lists[0][4] > 3.0 * lists[2][4]);
-    }
-
-    /// A filter's points may leave all bounds: a law then gives a number or NaN, and never ends the program.
-    #[test]
-    fn traces_follow_and_stand_nan() {
-        assert_eq!(
-            Trace::Play(0.5).of(&[1.0, 1.2, 2.0, 1.8], 0.1),
-            [1.0, 1.0, 1.5, 1.5]
-        );
-        let lagged = Trace::Lag(0.1).next(0.0, 1.0, 0.1);
-        assert!((lagged - (1.0 - (-1.0_f64).exp())).abs() < 1e-15);
-        for trace in [Trace::Lag(1.0), Trace::Play(0.5)] {
-            let _ = trace.next(1.0, f64::NAN, 0.1);
-        }
     }
 }

@@ -103,6 +103,15 @@ impl Library<'_> {
         (target, self.scales.columns(kind, target))
     }
 
+    /// Values of the other state of a law between two; none of other laws.
+    fn others(&self, effect: &Effect) -> Vec<f64> {
+        let states = &self.scales.outline.states;
+        let other = effect
+            .other()
+            .and_then(|name| states.iter().position(|q| q.name == name));
+        other.map_or_else(Vec::new, |i| self.scales.columns(TargetKind::State, i))
+    }
+
     /// The term with axes and starts of its free magnitudes; `None` where none is free, or where one has no range. `twin` has the effect.
     fn ranged(
         &self,
@@ -120,12 +129,15 @@ impl Library<'_> {
             return Ok(None);
         };
         let frequencies = self.with_slow_ones();
+        let others = self.others(&effect);
         let ranges = Ranges {
             effect: &effect,
             values,
+            others: &others,
             dt: self.scales.dt(),
             duration: self.scales.duration(),
             frequencies: &frequencies,
+            is_dear: !self.scales.has_equations(),
         };
         let space = twin.parameters();
         let entries: Vec<usize> = (term.names().iter())
@@ -133,7 +145,8 @@ impl Library<'_> {
             .collect::<Result<_, _>>()?;
         let mut grids: Vec<Vec<f64>> = vec![];
         for (m, &j) in free.iter().zip(&entries) {
-            let largest = || self.largest(twin, &entries, (j, &space[j]));
+            let deflected = f64::from(effect.kind().remembers().is_some());
+            let largest = || self.largest(twin, &entries, (j, &space[j]), deflected);
             let (mut grid, axis) = ranges.of(m, &space[j], largest);
             if is_own && m.is_threshold() && free.len() > 1 {
                 // One of several thresholds may be enough.
@@ -167,12 +180,13 @@ impl Library<'_> {
     }
 
     /// The size of entry `j` at which the effect is as large as the twin's own terms; all `entries` of the effect are off or in the middle of
-    /// their range.
+    /// their range, and memories at `memory`.
     fn largest(
         &self,
         twin: &Twin,
         entries: &[usize],
         (j, parameter): (usize, &Parameter),
+        memory: f64,
     ) -> Option<f64> {
         let outline = twin.outline()?;
         let space = twin.parameters();
@@ -181,19 +195,19 @@ impl Library<'_> {
         for &k in entries {
             theta[k] = if k == j { 0.0 } else { space[k].prior.centre() };
         }
-        let states = self.padded(outline.states.len());
+        let states = self.padded(outline.states.len(), memory);
         largest(twin, &theta, (j, parameter), &self.scales.records, &states)
     }
 
-    /// States of the twin, and zeros for memories that an effect adds.
-    fn padded(&self, count: usize) -> Vec<Signal> {
+    /// States of the twin, and this value for memories that an effect adds.
+    fn padded(&self, count: usize, memory: f64) -> Vec<Signal> {
         (self.scales.states.iter())
             .map(|states| {
                 Signal::from_shape_fn((states.nrows(), count), |(k, i)| {
                     if i < states.ncols() {
                         states[[k, i]]
                     } else {
-                        0.0
+                        memory
                     }
                 })
             })
@@ -241,6 +255,7 @@ fn bare(effect: &Effect, held: BTreeMap<String, f64>) -> Term {
         variables: vec![],
         mark: 0.0,
         also: vec![],
+        trail: None,
     }
 }
 

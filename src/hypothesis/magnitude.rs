@@ -22,6 +22,8 @@ const BEYOND: f64 = 0.5;
 const RATES: [f64; 5] = [0.02, 0.05, 0.1, 0.2, 0.5];
 /// Widths that are tried, in deviations of the signal.
 const WIDTHS: [f64; 4] = [0.2, 0.6, 1.5, 3.0];
+/// Widths over which a law turns that are tried, in spans.
+const KNEES: [f64; 3] = [0.02, 0.08, 0.25];
 /// Shares of its range at which a number with two ends is tried.
 const SHARES: [f64; 5] = [0.0, 0.1, 0.3, 0.6, 1.0];
 /// Longest step of a fit to a level, in its range. A step that is cut is cut for θ, too: with 0.15, diagnoses of real tanks with a ceiling
@@ -33,10 +35,14 @@ pub(super) struct Ranges<'a> {
     pub effect: &'a Effect,
     /// None for a parameter.
     pub values: &'a [f64],
+    /// Values of the other state of a law between two.
+    pub others: &'a [f64],
     pub dt: f64,
     pub duration: f64,
     /// Frequencies to try, in Hz.
     pub frequencies: &'a [f64],
+    /// True where each look costs simulations.
+    pub is_dear: bool,
 }
 
 impl Ranges<'_> {
@@ -65,6 +71,7 @@ impl Ranges<'_> {
         }
         match (m.shape, m.off) {
             (Shape::Rate, Some(off)) if off.is_infinite() => self.rate_limit(parameter),
+            (Shape::Frequency, Some(off)) if off.is_infinite() => self.mode(parameter),
             (_, Some(off)) if off.is_infinite() => self.threshold(parameter, off > 0.0),
             (Shape::Delay | Shape::TimeConstant, Some(_)) => self.lateness(parameter),
             (Shape::Time, _) => {
@@ -83,6 +90,7 @@ impl Ranges<'_> {
                 (grid, Axis { evidence, ..axis })
             }
             (Shape::Level, Some(_)) => self.width(parameter),
+            (Shape::Level, None) => self.knee(parameter),
             (shape, Some(_)) => {
                 let largest = largest().unwrap_or_else(|| self.usual(shape));
                 let axis = Axis {
@@ -160,6 +168,33 @@ impl Ranges<'_> {
         logarithmic(parameter, (SHORTEST * self.dt, longest), grid)
     }
 
+    /// Frequency of a mode: from two cycles of the record, by octaves, and where residuals peak. Where a look is dear, every second octave.
+    fn mode(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
+        let (low, high) = (2.0 / self.duration, 0.5 / self.dt);
+        let factor = if self.is_dear { 4.0 } else { 2.0 };
+        let octaves = std::iter::successors(Some(2.0 * low), |f| Some(factor * f));
+        let octaves = octaves.take_while(|f| *f < high);
+        let peaks = self.frequencies.iter().copied();
+        let peaks = peaks.filter(|f| *f > low && !self.is_dear);
+        logarithmic(parameter, (low, high), octaves.chain(peaks).collect())
+    }
+
+    /// Width over which a law turns, in what it is a law of: between the narrowest that rows resolve and half of the span.
+    fn knee(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
+        let values = if self.others.is_empty() {
+            self.values
+        } else {
+            self.others
+        };
+        let (low, high) = match values.is_empty() {
+            true => (0.0, 1.0),
+            false => ends(values),
+        };
+        let span = (high - low).max(1e-9);
+        let grid = KNEES.map(|share| share * span).to_vec();
+        logarithmic(parameter, (0.003 * span, 0.5 * span), grid)
+    }
+
     /// Width in the signal: beyond the widest, a dead zone or a play lets nothing pass.
     fn width(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
         let (low, high) = self.ends();
@@ -191,7 +226,11 @@ pub(super) fn frequency(
 fn number(m: &Magnitude, parameter: &Parameter) -> (Vec<f64>, Axis) {
     if m.limits.is_finite() {
         let (low, high) = (m.limits.low(), m.limits.high());
-        let grid = SHARES.map(|share| low + share * (high - low)).to_vec();
+        // Of a whole, and of exponents, all values are as likely; other numbers have their usual ones.
+        let grid = match m.shape {
+            Shape::Share if high != 1.0 => m.starts.to_vec(),
+            _ => SHARES.map(|share| low + share * (high - low)).to_vec(),
+        };
         return linear(parameter, (low, high), grid);
     }
     let (first, last) = ends(m.starts);

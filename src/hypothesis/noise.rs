@@ -88,5 +88,6 @@ pub(crate) fn proportional<'t>(
         variables: vec![],
         mark: 0.0,
         also: vec![],
+        trail: None,
     })
 }

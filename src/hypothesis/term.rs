@@ -1,6 +1,7 @@
 //! One hypothesis of what a twin lacks: a term that is added to it.
 
 use super::entry::{Entered, Entry, disturbed, with_function};
+use super::trace::Trail;
 use crate::effect::{Effect, EffectKey, Magnitude, Shape, augment_late};
 use crate::fit::axis::Axis;
 use crate::likelihood::kalman::FilterError;
@@ -74,6 +75,8 @@ pub(crate) struct Term {
     pub mark: f64,
     /// Listed effects that do the same in this twin: other names of this term.
     pub also: Vec<EffectKey>,
+    /// Trace that an unknown function is of: one of a grid of time constants or widths, of which a search keeps the best.
+    pub trail: Option<Trail>,
 }
 
 /// Nats that the outputs themselves speak for terms together. Repeated values are one mark of a sensor, whatever limits or rounds it.
@@ -128,7 +131,8 @@ impl Term {
         match &self.part {
             Part::Effect { effect, .. } => {
                 self.nature == Nature::Listed
-                    && (effect.magnitudes().iter()).any(|m| m.shape == Shape::Frequency)
+                    && (effect.magnitudes().iter())
+                        .any(|m| m.shape == Shape::Frequency && m.off.is_none())
             }
             Part::Disturbance { .. } | Part::Share { .. } | Part::Function(_) => false,
         }
@@ -229,6 +233,7 @@ pub(crate) mod fixture {
             variables: vec![],
             mark,
             also: vec![],
+            trail: None,
         }
     }
 }

@@ -3,15 +3,16 @@
 use super::basis::Of;
 use super::entry::Entry;
 use super::functions::{
-    PASTS, Trace, Variable, entered, of_past, of_signal, of_state, of_trace, wave,
+    MOST_STATES, PASTS, Variable, entered, of_past, of_signal, of_state, spread, visited, wave,
 };
 use super::listed::Library;
 use super::magnitude::uniform_axis;
+use super::remembered::remembered;
+use super::responses::responses;
 use super::scales::Scales;
 use super::term::{Nature, Part, Start, Term};
 use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
-use crate::math::quantile;
 use crate::record::Record;
 use crate::twin::{Parameter, Role, is_memory};
 
@@ -19,10 +20,6 @@ use crate::twin::{Parameter, Role, is_memory};
 const TIMES: usize = 3;
 /// Sizes of a disturbance, as shares of its largest.
 const SIZES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
-/// Most states for which functions of any two are rivals; beyond, only those with the state's own value.
-const MOST_STATES: usize = 4;
-/// Widths of a play that a signal is seen through, in ranges of it.
-const PLAYS: [f64; 2] = [0.25, 0.5];
 
 /// Unknown functions at every place of a twin; `seen` are states of models whose range the functions must cover.
 pub(crate) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
@@ -125,22 +122,6 @@ pub(crate) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
             let both = std::iter::once(&seen).chain(&time);
             terms.extend(both.map(|one| of_signal(&target, is_sensor, one, size)));
             terms.push(of_past(&target, is_sensor, name, past));
-            let lags = past[1..].iter().map(|tau| ("lagged", Trace::Lag(*tau)));
-            let plays =
-                PLAYS.map(|part| ("play of", Trace::Play(0.5 * part * (seen.high - seen.low))));
-            terms.extend(lags.chain(plays).filter_map(|(word, trace)| {
-                let values = trace.of(&scales.columns(kind, j), scales.dt());
-                let (low, high) = visited(std::iter::once(values))?;
-                let name = format!("{word} {name}");
-                let of = Of::Signal;
-                let seen = Variable {
-                    name,
-                    of,
-                    low,
-                    high,
-                };
-                Some(of_trace(&target, is_sensor, &seen, size, trace))
-            }));
             if is_sensor {
                 let states = of_states.iter().map(|(_, state)| state);
                 let others = states.chain(&of_inputs);
@@ -176,6 +157,8 @@ pub(crate) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
             terms.extend(periodic("parameter", target, 1.0, frequency(target)));
         }
     }
+    terms.extend(remembered(library, seen));
+    terms.extend(responses(library));
     terms
 }
 
@@ -232,21 +215,7 @@ pub(super) fn disturbances(
             variables: vec![],
             mark: 0.0,
             also: vec![],
+            trail: None,
         })
         .collect()
-}
-
-/// Range that lists of values cover, but for a hundredth of each; `None` where nothing moves.
-fn visited(all: impl Iterator<Item = Vec<f64>>) -> Option<(f64, f64)> {
-    let at = |values: &[f64], p| quantile(values, p).unwrap_or(f64::NAN);
-    let ends = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), values| {
-        (low.min(at(&values, 0.005)), high.max(at(&values, 0.995)))
-    });
-    (ends.0 < ends.1).then_some(ends)
-}
-
-/// Values from low to high, evenly in their logarithm.
-fn spread<const N: usize>(low: f64, high: f64) -> [f64; N] {
-    let high = high.max(2.0 * low);
-    std::array::from_fn(|i| low * (high / low).powf(i as f64 / (N - 1) as f64))
 }

@@ -1,7 +1,9 @@
 //! Likelihood of a record under a twin of either kind, chosen once.
 
 use super::ensemble;
-use super::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score, States};
+use super::kalman::{
+    Coordinates, FilterError, FilterSettings, Filtered, Kalman, Responses, Score, States,
+};
 use crate::record::{Record, Signal};
 use crate::twin::{Composed, ComposedBlackBox, DigitalTwin, Outline, Twin};
 use std::sync::Arc;
@@ -20,6 +22,8 @@ pub(crate) trait Likelihood: Send + Sync {
     fn disturbances(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError>;
     /// Outputs predicted from the rows before, over missing rows as far ahead as these last; `None` where only free runs are known.
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError>;
+    /// Responses of predictions to small additions; `None` without equations.
+    fn responses(&self, theta: &[f64], record: &Record) -> Result<Option<Responses>, FilterError>;
     /// Log-likelihood, with the innovations where they come at no extra cost.
     fn log_likelihood(
         &self,
@@ -84,6 +88,9 @@ impl Likelihood for FilterLikelihood {
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
         self.kalman(record, &self.1)?.predictions(theta).map(Some)
     }
+    fn responses(&self, theta: &[f64], record: &Record) -> Result<Option<Responses>, FilterError> {
+        self.kalman(record, &self.1)?.responses(theta).map(Some)
+    }
     fn log_likelihood(
         &self,
         theta: &[f64],
@@ -134,6 +141,9 @@ impl Likelihood for EnsembleLikelihood {
         Ok(None)
     }
     fn predicted(&self, _: &[f64], _: &Record) -> Result<Option<Signal>, FilterError> {
+        Ok(None)
+    }
+    fn responses(&self, _: &[f64], _: &Record) -> Result<Option<Responses>, FilterError> {
         Ok(None)
     }
     fn log_likelihood(

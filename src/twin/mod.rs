@@ -29,9 +29,9 @@ mod state_space;
 pub(crate) use adapt::{Adaptation, DeclaredNoise, NoiseLevel, StartLevel, adapt, begun, fix};
 pub(crate) use blocks::Blocks;
 pub(crate) use composed::{
-    Acting, DeadTime, Disturbance, Entry, FittedLevels, KnownNoise, LARGEST, Law, LawPart,
-    LawPlace, LevelSource, LevelValue, NoisePart, ParameterChange, RateChange, SensorNoise,
-    SignalChange, StateLimit, TwinPart, WhiteLevel,
+    Acting, DeadTime, Disturbance, Entry, FittedLevels, Follows, KnownNoise, LARGEST, Law, LawPart,
+    LawPlace, LevelSource, LevelValue, NoisePart, ParameterChange, RateChange, Remember, Seen,
+    SensorNoise, SignalChange, StateLimit, TwinPart, WhiteLevel,
 };
 pub use composed::{Composed, ComposedBlackBox, DigitalTwin};
 pub(crate) use definitions::rates;

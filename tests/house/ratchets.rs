@@ -278,11 +278,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 159, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 53_700, lines),
-        Ratchet::new("files", 442, files.collect()),
+        Ratchet::new("lines of code", 54_950, lines),
+        Ratchet::new("files", 449, files.collect()),
         Ratchet::new("hidden items", 3, hidden(sources)),
         Ratchet::new("methods of StateSpace", 14, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 452, constants(sources)),
+        Ratchet::new("named numeric constants", 461, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             4,

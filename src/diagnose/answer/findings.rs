@@ -86,7 +86,10 @@ fn holds(function: &Term, effect: &Term) -> bool {
     }
     let has_memory = law.kind().memory_values() > 0;
     if function.nature == Nature::Past {
-        return has_memory;
+        // Inside the twin, of the same variable.
+        let from = law.other().filter(|_| law.kind().remembers().is_some());
+        let is_of = |name: &str| function.id.ends_with(&format!(" {name})"));
+        return has_memory && from.is_none_or(is_of);
     }
     // Every function contains a constant.
     if law.id().ends_with("-bias") || law.id() == "constant-forcing" {
@@ -95,6 +98,9 @@ fn holds(function: &Term, effect: &Term) -> bool {
     let [(variable, ..)] = function.variables.as_slice() else {
         return false;
     };
+    if has_memory && law.law().target() == TargetKind::State {
+        return false;
+    }
     let of_time = variable == "t";
     match law.law().target() {
         TargetKind::State if law.id() == "periodic-disturbance" => of_time,

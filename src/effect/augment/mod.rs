@@ -5,7 +5,8 @@ use super::law::NOISE_ENTERS;
 use super::placed::{Effect, magnitude_unit};
 use crate::record::{Quantity, Signals};
 use crate::twin::{
-    Interval, Law, LawPart, Parameter, Role, SimulationError, Twin, TwinError, TwinPart,
+    Follows, Interval, Law, LawPart, Parameter, Role, Seen, SimulationError, Twin, TwinError,
+    TwinPart,
 };
 use std::ops::Range;
 use std::sync::Arc;
@@ -107,6 +108,10 @@ fn part(base: &Twin, effect: &Effect, magnitudes: Range<usize>, known: &[String]
     LawPart {
         other: effect.other().and_then(index),
         memory: kind.memory_values(),
+        follows: kind.remembers().map(|by| Follows {
+            of: Seen::State(effect.other().and_then(index).unwrap_or(target)),
+            by: by.clone(),
+        }),
         is_dead_time: kind.is_dead_time(),
         ..LawPart::new(law, effect.key().to_string(), target, magnitudes)
     }

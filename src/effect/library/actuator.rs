@@ -3,8 +3,8 @@
 use super::super::kind::EffectKind;
 use super::super::magnitude::{Magnitude, Shape};
 use super::shared::{
-    DELAY, DELAY_SAMPLES, ERROR, HIGH, LOW, OFFSET, TAU, WIDTH, check_delay, clamp, delay, lag,
-    limit_rate,
+    DAMPING, DELAY, DELAY_SAMPLES, ERROR, HIGH, LOW, MODE, OFFSET, TAU, WIDTH, check_delay, clamp,
+    delay, lag, limit_rate, ring,
 };
 
 pub(super) fn rows() -> Vec<EffectKind> {
@@ -77,6 +77,17 @@ pub(super) fn rows() -> Vec<EffectKind> {
         .magnitude(TAU)
         .memory(1)
         .order(70),
+        // A mode of the drive that nobody modelled; v starts at rest, at the first u.
+        EffectKind::actuator(
+            "actuator-mode",
+            "v̈ + 2·damping·ω·v̇ + ω²·v = ω²·u, ω = 2π·frequency",
+            |m, now, memory, u| ring(m, now.dt, memory, u),
+        )
+        .with_sentence("{place} rings at {frequency} with a damping ratio of {damping}.")
+        .magnitude(MODE)
+        .magnitude(DAMPING)
+        .memory(2)
+        .order(75),
         // A dead time of at most 63 steps; the first value before the start.
         EffectKind::actuator(
             "actuator-delay",

@@ -2,13 +2,19 @@
 
 use super::super::kind::EffectKind;
 use super::super::magnitude::{Magnitude, Shape};
-use super::super::marks::{clipped, rounded};
+use super::super::marks::{clipped, rounded, unclipped};
 use super::shared::{
-    DELAY, DELAY_SAMPLES, ERROR, HIGH, LOW, OFFSET, TAU, check_delay, clamp, delay, lag,
+    DAMPING, DELAY, DELAY_SAMPLES, ERROR, HIGH, LOW, MODE, OFFSET, TAU, WIDTH, check_delay, clamp,
+    delay, lag, ring,
 };
 use crate::twin::Outliers;
 
 pub(super) fn rows() -> Vec<EffectKind> {
+    [errors(), dynamics(), limits(), readings()].concat()
+}
+
+/// Errors of zero and scale, and play.
+fn errors() -> Vec<EffectKind> {
     vec![
         // A constant error of the zero.
         EffectKind::sensor("sensor-bias", "s + offset", |m, _, _, s| s + m[0])
@@ -31,6 +37,25 @@ pub(super) fn rows() -> Vec<EffectKind> {
             Magnitude::signed("rate", "signal/s", &[-0.01, -0.001, 0.001, 0.01]).shape(Shape::Rate),
         )
         .order(30),
+        // Play between the signal and its gauge; z starts at the first s.
+        EffectKind::sensor(
+            "sensor-backlash",
+            "z ← clamp(z, s ± width/2)",
+            |m, _, memory, s| {
+                memory[0] = clamp(memory[0], s - 0.5 * m[0], s + 0.5 * m[0]);
+                memory[0]
+            },
+        )
+        .with_sentence("{place} has a play of {width}.")
+        .magnitude(WIDTH)
+        .memory(1)
+        .order(35),
+    ]
+}
+
+/// Lags, modes and delays.
+fn dynamics() -> Vec<EffectKind> {
+    vec![
         // A first-order lag; the reading is z, which starts at the first s.
         EffectKind::sensor(
             "sensor-lag",
@@ -41,6 +66,17 @@ pub(super) fn rows() -> Vec<EffectKind> {
         .magnitude(TAU)
         .memory(1)
         .order(40),
+        // A mode of the gauge that nobody modelled; z starts at rest, at the first s.
+        EffectKind::sensor(
+            "sensor-mode",
+            "z̈ + 2·damping·ω·ż + ω²·z = ω²·s, ω = 2π·frequency",
+            |m, now, memory, s| ring(m, now.dt, memory, s),
+        )
+        .with_sentence("{place} rings at {frequency} with a damping ratio of {damping}.")
+        .magnitude(MODE)
+        .magnitude(DAMPING)
+        .memory(2)
+        .order(45),
         // A dead time of at most 63 steps; the first value before the start.
         EffectKind::sensor(
             "sensor-delay",
@@ -53,6 +89,12 @@ pub(super) fn rows() -> Vec<EffectKind> {
         .dead_time()
         .check(|m, dt| check_delay(m[0], dt))
         .order(50),
+    ]
+}
+
+/// Folds and ends before the noise.
+fn limits() -> Vec<EffectKind> {
+    vec![
         // A part f of the signal is rectified.
         EffectKind::sensor(
             "sensor-rectification",
@@ -66,6 +108,23 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 .shape(Shape::Share),
         )
         .order(60),
+        // A limited range before the noise, so that no value repeats. Where low exceeds high, high wins.
+        EffectKind::sensor(
+            "sensor-clipping",
+            "clamp(s, low, high), before the noise",
+            |m, _, _, s| clamp(s, m[0], m[1]),
+        )
+        .with_sentence("{place} sees nothing below {low} or above {high}; its noise comes on top.")
+        .magnitude(LOW)
+        .magnitude(HIGH)
+        .mark(unclipped)
+        .order(65),
+    ]
+}
+
+/// Noise, and what acts on readings.
+fn readings() -> Vec<EffectKind> {
+    vec![
         // White noise. A black box's own is already in its outputs; independent draws are added there.
         EffectKind::measurement_noise(
             "sensor-noise",

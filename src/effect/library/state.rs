@@ -1,12 +1,12 @@
-//! Effects on states: forces on the rate of x, a ceiling, noise.
+//! Effects on states: forces on the rate of x, a ceiling and a floor, noise.
 
 use super::super::kind::{EffectKind, OtherState};
 use super::super::magnitude::{Magnitude, Shape};
-use super::shared::sign;
+use super::shared::{Deflection, sign};
 use std::f64::consts::TAU;
 
 pub(super) fn rows() -> Vec<EffectKind> {
-    let mut rows = forces();
+    let mut rows = [pushes(), forces()].concat();
     rows.extend([
         // After each step, the excess over the level is cut. A twin of one state names itself: the excess is lost.
         EffectKind::limit(
@@ -30,6 +30,20 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 .never_off(),
         )
         .other(OtherState::To),
+        // After each step, a deficit is made up: a weir, a bottom, a stop.
+        EffectKind::limit(
+            "state-floor",
+            "what is below level is set to level",
+            |m, x, _| {
+                if *x < m[0] {
+                    *x = m[0];
+                }
+            },
+        )
+        .with_sentence("{place} stops falling at {level}.")
+        .magnitude(
+            Magnitude::signed("level", "state", &[-1.0, 0.1, 0.5, 1.0]).off(f64::NEG_INFINITY),
+        ),
         // White noise: an increment N(0, std²) a step.
         EffectKind::process_noise(
             "process-noise",
@@ -42,7 +56,8 @@ pub(super) fn rows() -> Vec<EffectKind> {
     rows
 }
 
-fn forces() -> Vec<EffectKind> {
+/// Forces of a constant size.
+fn pushes() -> Vec<EffectKind> {
     vec![
         // A constant push or leak.
         EffectKind::force("constant-forcing", "ẋ + force", |m, _| m[0])
@@ -58,6 +73,58 @@ fn forces() -> Vec<EffectKind> {
         })
         .with_sentence("Dry friction of {force} acts against {place}.")
         .magnitude(Magnitude::positive("force", "state/s", &[0.03, 0.1, 0.3])),
+        // Dry friction that is larger at rest: Coulomb's at speed, and an excess that falls off with the square of the speed. Source:
+        // Armstrong-Hélouvry, Dupont & Canudas de Wit, "A survey of models … of machines with friction", *Automatica* 30 (1994).
+        EffectKind::force(
+            "stribeck-friction",
+            "ẋ − force·(1 + excess·exp(−(x/velocity)²))·sign x",
+            |m, at| {
+                if at.x == 0.0 {
+                    return 0.0;
+                }
+                let rest = (-(at.x / m[2]).powi(2)).exp();
+                -m[0] * (1.0 + m[1] * rest) * sign(at.x)
+            },
+        )
+        .with_sentence(
+            "Dry friction of {force} acts against {place}; at rest it is larger by {%excess}, which falls off within {velocity}.",
+        )
+        .magnitude(Magnitude::positive("force", "state/s", &[0.03, 0.1, 0.3]))
+        .magnitude(
+            // Static friction is hardly more than twice Coulomb's.
+            Magnitude::positive("excess", "1", &[0.2, 0.5, 1.0])
+                .within(0.0, 1.0)
+                .shape(Shape::Share)
+                .never_off(),
+        )
+        .magnitude(
+            Magnitude::positive("velocity", "state", &[0.1, 0.3, 1.0])
+                .shape(Shape::Level)
+                .never_off(),
+        ),
+        // Presliding, magnetic and material hysteresis: a force that turns round within a width of where the motion does.
+        EffectKind::force(
+            "state-hysteresis",
+            "ẋ − force·z, ż = (v̇ − ½·abs(v̇)·z − ½·v̇·abs(z))/width, v = x_from",
+            |m, at| -m[0] * at.memory[0],
+        )
+        .with_sentence("A force of up to {force} acts on {place}, with a hysteresis of {width} in {other}.")
+        .magnitude(Magnitude::positive("force", "state/s", &[0.03, 0.1, 0.3]))
+        .magnitude(
+            Magnitude::positive("width", "from", &[0.1, 0.3, 1.0])
+                .within(1e-12, f64::INFINITY)
+                .shape(Shape::Level)
+                .never_off(),
+        )
+        .other(OtherState::RateOfOrItself)
+        .memory(2)
+        .follows(Deflection),
+    ]
+}
+
+/// Forces that grow with a state, and waves.
+fn forces() -> Vec<EffectKind> {
+    vec![
         // Leakage, cooling, viscous friction.
         EffectKind::force("linear-loss", "ẋ − rate·x", |m, at| -m[0] * at.x)
             .with_sentence("{place} is lost at a further rate of {rate}.")

@@ -18,11 +18,13 @@
 
 mod draws;
 mod expansion;
+mod linear;
 mod sizes;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use expansion::{CREDIT, Laplace, log_mean};
+pub(crate) use linear::linear_evidence;
 
 use super::climb::Fitted;
 use super::posterior::PosteriorSample;

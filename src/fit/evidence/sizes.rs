@@ -7,6 +7,14 @@ use nalgebra::DMatrix;
 /// Values of τ.
 const SIZES: usize = 6;
 
+/// Sizes from what is just visible, where a size of one has the information `most`, to the largest.
+pub(super) fn sizes(most: f64, largest: f64) -> impl Iterator<Item = f64> {
+    let visible = 1.0 / most.sqrt();
+    let largest = largest.max(2.0 * visible);
+    let ratio = (largest / visible).ln() / (SIZES - 1) as f64;
+    (0..SIZES).map(move |i| visible * (ratio * i as f64).exp())
+}
+
 /// Magnitudes that share one prior, and the deviations that it may give each of them.
 pub(super) struct SizePrior {
     pub(super) entries: Vec<usize>,
@@ -48,13 +56,8 @@ impl SizePrior {
                                 roots[a] * own[(a, b)] * roots[b]
                             });
                             let most = scaled.symmetric_eigenvalues().max().max(1e-300);
-                            let visible = 1.0 / most.sqrt();
-                            let largest = largest.max(2.0 * visible);
-                            let ratio = (largest / visible).ln() / (SIZES - 1) as f64;
-                            (0..SIZES).map(move |i| {
-                                let size = visible * (ratio * i as f64).exp();
-                                roots.iter().map(|root| size * root).collect()
-                            })
+                            sizes(most, largest)
+                                .map(move |size| roots.iter().map(|root| size * root).collect())
                         })
                         .collect();
                     Self { entries, options }

@@ -8,24 +8,23 @@ mod fits;
 mod fold;
 pub(crate) mod frequencies;
 pub(crate) mod model;
+mod rivals;
 mod screen;
+mod traces;
 mod valleys;
 
 pub(crate) use breadth::{BETTER, Breadth, CANDIDATES, FEW, NULL_LIKE};
+pub(crate) use rivals::unknown;
 
 use crate::fit::climb::{Fitted, climb};
-use crate::fit::evidence::log_mean;
 use crate::hypothesis::set::TermSet;
-use crate::hypothesis::term::{Nature, Term, marks};
+use crate::hypothesis::term::{Term, marks};
 use crate::likelihood::kalman::FilterError;
-use crate::math::median;
 use explanation::{Explanation, sort};
-use fits::{
-    CARRIED, Effort, anneal, fit_afresh, fit_function, fit_promise, fit_unfolded, loudly, release,
-};
+use fits::{CARRIED, Effort, anneal, fit_afresh, fit_promise, fit_unfolded, loudly, release};
 use model::Model;
 use rayon::prelude::*;
-use screen::{Promise, functions, scan};
+use screen::{Promise, scan};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use valleys::leave_valleys;
@@ -35,14 +34,15 @@ use valleys::leave_valleys;
 const STARTS_OF_SHAPE: usize = 12;
 /// Nats that averaging over its size takes off an effect that nothing speaks for.
 const AVERAGED: f64 = 2.0;
-/// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
-const PRICE_OF_FREQUENCY: f64 = 2.5;
 
 /// Nats below the best, with noise half-way down, from which an effect is given up: loud noise makes differences smaller than they will be.
 const LOST: f64 = 25.0;
 
-/// The best of terms that are one hypothesis used in several ways, which share its prior.
-fn merged(all: Vec<Explanation>, ways: &BTreeMap<String, usize>) -> Vec<Explanation> {
+/// Nats that the ways to use a hypothesis cost it, by its key: they share its prior.
+type Ways = BTreeMap<String, f64>;
+
+/// The best of terms that are one hypothesis used in several ways.
+fn merged(all: Vec<Explanation>, ways: &Ways) -> Vec<Explanation> {
     let mut best: BTreeMap<TermSet, Explanation> = BTreeMap::new();
     for found in all {
         let keys = found.set();
@@ -55,8 +55,7 @@ fn merged(all: Vec<Explanation>, ways: &BTreeMap<String, usize>) -> Vec<Explanat
     }
     let mut all: Vec<Explanation> = (best.into_values())
         .map(|mut found| {
-            let ways = ways.get(&found.last().key()).copied().unwrap_or(1);
-            found.log_z -= (ways as f64).ln();
+            found.log_z -= ways.get(&found.last().key()).copied().unwrap_or(0.0);
             found
         })
         .collect();
@@ -64,12 +63,13 @@ fn merged(all: Vec<Explanation>, ways: &BTreeMap<String, usize>) -> Vec<Explanat
     all
 }
 
-fn ways(terms: &[Arc<Term>]) -> BTreeMap<String, usize> {
-    let mut ways = BTreeMap::new();
+fn ways(terms: &[Arc<Term>]) -> Ways {
+    let mut ways: BTreeMap<String, usize> = BTreeMap::new();
     for term in terms {
         *ways.entry(term.key()).or_insert(0) += 1;
     }
-    ways
+    let nats = |(key, count): (String, usize)| (key, (count as f64).ln());
+    ways.into_iter().map(nats).collect()
 }
 
 /// Knowledge with which a search for listed effects begins.
@@ -140,9 +140,7 @@ pub(crate) fn listed(
     for promise in unfitted {
         if !all.iter().any(|f| Arc::ptr_eq(f.last(), &promise.term)) {
             all.push(Explanation {
-                terms: (model.terms.iter().chain([&promise.term]))
-                    .cloned()
-                    .collect(),
+                terms: beside(model, &promise.term),
                 log_z: floor + (promise.nats() - AVERAGED).min(-0.5),
                 model: None,
             });
@@ -261,132 +259,7 @@ fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Resul
     Ok(())
 }
 
-/// Unknown functions beside a model; best first.
-pub(crate) fn unknown(
-    model: &Model,
-    terms: &[Arc<Term>],
-    breadth: Breadth,
-) -> Result<Vec<Explanation>, FilterError> {
-    let floor = model.log_evidence;
-    let of = |natures: &[Nature]| -> Vec<Arc<Term>> {
-        terms
-            .iter()
-            .filter(|t| natures.contains(&t.nature))
-            .cloned()
-            .collect()
-    };
-    let mut all: Vec<Explanation> = vec![];
-    let half = breadth.functions.div_ceil(2);
-    for (natures, price, most) in [
-        (&[Nature::Function], 0.0, breadth.functions),
-        (&[Nature::Past], 0.0, half),
-        (&[Nature::Reading], 0.0, half),
-        (&[Nature::Periodic], PRICE_OF_FREQUENCY, half),
-    ] {
-        let linear = functions(model, &of(natures))?;
-        let fits: Vec<(Vec<Arc<Term>>, f64, Option<Model>)> = (linear.into_par_iter())
-            .enumerate()
-            .map(|(i, linear)| {
-                let (terms, gain) = (linear.extended.terms.clone(), linear.gain - price);
-                let iterations = if gain > 10.0 { 6 } else { 4 };
-                let fitted = match i < most && linear.gain > breadth.least {
-                    true => fit_function(model, linear, iterations)?,
-                    false => None,
-                };
-                Ok((terms, gain, fitted))
-            })
-            .collect::<Result<_, FilterError>>()?;
-        let refits: Vec<(f64, Option<f64>)> = (fits.iter())
-            .map(|(_, gain, m)| (*gain, added(model, m.as_ref())))
-            .collect();
-        let estimates = of_promises(&refits, breadth.least);
-        all.extend(
-            (fits.into_iter().zip(estimates)).map(|((terms, _, model), gain)| Explanation {
-                log_z: floor + gain,
-                terms,
-                model,
-            }),
-        );
-    }
-    let promises = scan(model, &of(&[Nature::Time]))?;
-    // The starts of a disturbance are sizes from its prior: their mean likelihood is the evidence, but for what θ answers.
-    let rough: Vec<f64> = (promises.iter())
-        .map(|p| log_mean(&p.starts.iter().map(|start| start.nats).collect::<Vec<_>>()))
-        .collect();
-    let mut order: Vec<usize> = (0..rough.len()).collect();
-    order.sort_by(|a, b| rough[*b].total_cmp(&rough[*a]));
-    let fits: Vec<(usize, Option<Model>)> = (order.into_par_iter())
-        .enumerate()
-        .map(|(n, i)| {
-            let worth = n < half && (rough[i] > 0.0 || promises[i].nats() > breadth.least);
-            let effort = Effort {
-                starts: 2,
-                iterations: 6,
-            };
-            let fitted = if worth {
-                fit_promise(model, &promises[i], &[], effort)?
-            } else {
-                None
-            };
-            Ok((i, fitted))
-        })
-        .collect::<Result<_, FilterError>>()?;
-    let refits: Vec<(f64, Option<f64>)> = (fits.iter())
-        .map(|(i, m)| (rough[*i], added(model, m.as_ref())))
-        .collect();
-    let estimates = of_promises(&refits, breadth.least);
-    all.extend(
-        (fits.into_iter().zip(estimates)).map(|((i, fitted), gain)| Explanation {
-            terms: (model.terms.iter().chain([&promises[i].term]))
-                .cloned()
-                .collect(),
-            log_z: floor + gain,
-            model: fitted,
-        }),
-    );
-    Ok(merged(all, &ways(terms)))
-}
-
-/// Evidence that a fit beside a model adds to it.
-fn added(model: &Model, fitted: Option<&Model>) -> Option<f64> {
-    Some(fitted?.log_evidence - model.log_evidence)
-}
-
-/// Nats of hypotheses that promise nats and of which the best were refitted: of the others the share of their promise that the refits kept,
-/// by the median, and no more than the best refit. A promise counts what a step far beyond the quadratic's reach would gain.
-fn of_promises(all: &[(f64, Option<f64>)], least: f64) -> Vec<f64> {
-    let refits = || {
-        all.iter()
-            .filter_map(|(gain, refit)| Some((*gain, (*refit)?)))
-    };
-    let shares: Vec<f64> = refits()
-        .filter(|(gain, _)| *gain > 0.0)
-        .map(|(gain, refit)| refit / gain)
-        .collect();
-    let share = median(&shares).unwrap_or(1.0).clamp(0.0, 1.0);
-    let best = refits().map(|(_, refit)| refit).fold(least, f64::max);
-    (all.iter())
-        .map(|(gain, refit)| {
-            refit.unwrap_or((gain * if *gain > 0.0 { share } else { 1.0 }).min(best))
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Three refits kept a half, so the fourth is worth half its promise; what promises a loss keeps it.
-    #[test]
-    fn what_is_not_refitted_is_no_better_than_the_refits_tell() {
-        let all = [
-            (40.0, Some(20.0)),
-            (30.0, Some(18.0)),
-            (20.0, Some(8.0)),
-            (16.0, None),
-            (-1.0, None),
-        ];
-        assert_eq!(of_promises(&all, 2.5), [20.0, 18.0, 8.0, 8.0, -1.0]);
-        assert_eq!(of_promises(&[(5.0, None)], 2.5), [2.5]);
-    }
+/// The terms of a model and one more.
+fn beside(model: &Model, term: &Arc<Term>) -> Vec<Arc<Term>> {
+    (model.terms.iter().chain([term])).cloned().collect()
 }

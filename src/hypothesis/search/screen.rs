@@ -44,16 +44,29 @@ impl Promise {
 
 /// Promises of terms beside a model, best first; terms that nothing can be told of are left out.
 pub(crate) fn scan(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Promise>, FilterError> {
-    let Some(reference) =
-        recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
-    else {
-        return Ok(vec![]);
-    };
+    match reference(model)? {
+        Some(reference) => scan_from(model, &reference, terms),
+        None => Ok(vec![]),
+    }
+}
+
+/// Innovations of a model, and what its θ answers; `None` where the filter does not work beside it.
+pub(crate) fn reference(model: &Model) -> Result<Option<Reference>, FilterError> {
+    let reference = Reference::new(&model.problem, &model.fitted.theta);
+    Ok(recoverable(reference)?.flatten())
+}
+
+/// The same with the innovations at hand.
+pub(crate) fn scan_from(
+    model: &Model,
+    reference: &Reference,
+    terms: &[Arc<Term>],
+) -> Result<Vec<Promise>, FilterError> {
     let mut all: Vec<Promise> = (terms.par_iter())
         .map(|term| {
             let extended = model.extend(term)?;
             let mut starts: Vec<Beginning> = (term.starts.par_iter())
-                .map(|start| promise(model, &reference, &extended, start))
+                .map(|start| promise(model, reference, &extended, start))
                 .collect::<Result<Vec<_>, FilterError>>()?
                 .into_iter()
                 .flatten()

@@ -74,6 +74,11 @@ impl<'k> Order<'k> {
         self.dead_time.get(j).is_some_and(|late| *late > 0)
     }
 
+    /// Returns the samples by which each output is late; empty where none is.
+    pub fn late(&self) -> &[usize] {
+        &self.dead_time
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.values.len() / self.channels

@@ -8,8 +8,10 @@ pub(super) const MOST_NAMES: usize = 3;
 /// Kinds of target that an id may begin with: the place says them again.
 const KINDS: [&str; 4] = ["sensor-", "actuator-", "state-", "parameter-"];
 /// Last words of nouns that take no article.
-const UNCOUNTED: [&str; 10] = [
+const UNCOUNTED: [&str; 12] = [
     "backlash",
+    "clipping",
+    "hysteresis",
     "drag",
     "friction",
     "noise",

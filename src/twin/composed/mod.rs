@@ -27,8 +27,8 @@ pub use digital_twin::DigitalTwin;
 pub(in crate::twin) use digital_twin::FREE_RUNS;
 pub(crate) use known_noise::{KnownNoise, NoisePart, SensorNoise, WhiteLevel};
 pub(crate) use part::{
-    Disturbance, Entry, FittedLevels, LARGEST, Law, LawPart, LawPlace, LevelSource, LevelValue,
-    ParameterChange, RateChange, SignalChange, StateLimit, TwinPart,
+    Disturbance, Entry, FittedLevels, Follows, LARGEST, Law, LawPart, LawPlace, LevelSource,
+    LevelValue, ParameterChange, RateChange, Remember, Seen, SignalChange, StateLimit, TwinPart,
 };
 pub(crate) use simulation::{Acting, DeadTime, check_start};
 

@@ -105,6 +105,9 @@ impl Composed {
 
     fn remember(&self, now: &Now<'_>, x: &mut [f64]) {
         let at = self.layout();
+        if self.parts.acts.in_memories {
+            self.follow(now, x);
+        }
         if self.parts.acts.in_sensors {
             self.remember_signals(now, x);
         }

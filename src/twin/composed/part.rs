@@ -95,6 +95,33 @@ pub(crate) trait ParameterChange: Send + Sync {
     }
 }
 
+/// Signal inside a twin that a law remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Seen {
+    State(usize),
+    Input(usize),
+    /// As the twin's own equations show it.
+    Output(usize),
+}
+
+/// Memory of a signal inside the twin: it moves once a sample, before the motion of the step that it acts in.
+pub(crate) trait Remember: Send + Sync {
+    /// Sets the memory at the first sample, where the signal is `value`.
+    fn begin(&self, value: f64, memory: &mut [f64]) {
+        memory.fill(value);
+    }
+
+    /// Moves the memory on; `m` are the magnitudes of its law.
+    fn next(&self, m: &[f64], dt: f64, value: f64, memory: &mut [f64]);
+}
+
+/// A law's memory, and the signal that it follows.
+#[derive(Clone)]
+pub(crate) struct Follows {
+    pub of: Seen,
+    pub by: Arc<dyn Remember>,
+}
+
 /// A function of magnitudes and of what it bends, over several points at once.
 #[derive(Clone)]
 pub(crate) enum Law {
@@ -134,6 +161,8 @@ pub(crate) struct LawPart {
     pub magnitudes: Range<usize>,
     /// Number of values that it remembers; they begin at the first value of the signal.
     pub memory: usize,
+    /// Signal inside the twin that the memory follows, where it is not the signal that the law bends.
+    pub follows: Option<Follows>,
     /// `true` where it shows the signal as it was so many seconds ago, its first magnitude.
     pub is_dead_time: bool,
 }
@@ -148,6 +177,7 @@ impl LawPart {
             other: None,
             magnitudes,
             memory: 0,
+            follows: None,
             is_dead_time: false,
         }
     }

@@ -1,6 +1,6 @@
 //! The list of parts of a twin, and the inside of its delays.
 
-use super::part::{Disturbance, Entry, Law, LawPart, TwinPart};
+use super::part::{Disturbance, Entry, Follows, Law, LawPart, TwinPart};
 use crate::record::Quantity;
 use crate::twin::{
     Integrator, Interval, Noise, Now, Outline, Parameter, ParameterSpace, Stepping, TwinError,
@@ -68,6 +68,8 @@ pub(in crate::twin) struct Acts {
     pub on_start: bool,
     /// `true` where sensors remember.
     pub in_sensors: bool,
+    /// `true` where laws remember signals inside the twin.
+    pub in_memories: bool,
     /// `true` where disturbances move.
     pub in_disturbances: bool,
 }
@@ -98,6 +100,7 @@ impl Acts {
     }
 
     fn add_law(&mut self, part: &LawPart) {
+        self.in_memories |= part.follows.is_some();
         match &part.law {
             Law::Parameter(law) => {
                 self.on_parameters = true;
@@ -108,7 +111,7 @@ impl Acts {
             Law::Reading(_) => self.on_readings = true,
             Law::Sensor(_) => {
                 self.on_outputs = true;
-                self.in_sensors |= part.memory > 0;
+                self.in_sensors |= part.memory > 0 && part.follows.is_none();
             }
             Law::MeasurementNoise(_) | Law::ProcessNoise(_) => self.on_noise = true,
             Law::Actuator(_) | Law::Rounding(_) | Law::Outliers(_) => {}
@@ -117,7 +120,7 @@ impl Acts {
 
     /// Returns whether the equations move as the twin's own do.
     pub fn leave_motion(self) -> bool {
-        let remembers = self.in_sensors || self.in_disturbances;
+        let remembers = self.in_sensors || self.in_memories || self.in_disturbances;
         !(self.on_parameters || self.on_rates || self.on_limits || remembers)
     }
 
@@ -246,7 +249,7 @@ impl Parts {
                 (self.integrator, self.stepping) = (*integrator, *stepping);
             }
             TwinPart::Late(entries) => self.delays.push(entries.clone()),
-            TwinPart::Law(part) if matches!(part.law, Law::Sensor(_)) => {
+            TwinPart::Law(part) if part.follows.is_some() || matches!(part.law, Law::Sensor(_)) => {
                 let memory = match part.is_dead_time {
                     true => BETWEEN_SAMPLES,
                     false => part.memory,
@@ -292,6 +295,14 @@ impl Parts {
     pub fn laws(&self) -> impl Iterator<Item = &LawPart> {
         self.list.iter().filter_map(|added| match &added.part {
             TwinPart::Law(part) => Some(part),
+            _ => None,
+        })
+    }
+
+    /// Returns the laws that remember signals inside the twin.
+    pub fn memories(&self) -> impl Iterator<Item = (&Added, &LawPart, &Follows)> {
+        self.list.iter().filter_map(|added| match &added.part {
+            TwinPart::Law(part) => Some((added, part, part.follows.as_ref()?)),
             _ => None,
         })
     }

@@ -1,7 +1,9 @@
 //! Outputs, starts and inputs of composed equations.
 
 use super::parts::{Added, Theta};
-use super::{Acting, Composed, Disturbance, Entry, Law, LawPart, LawPlace, SignalChange, TwinPart};
+use super::{
+    Acting, Composed, Disturbance, Entry, Law, LawPart, LawPlace, Seen, SignalChange, TwinPart,
+};
 use crate::record::{Drive, RecordError, Signal};
 use crate::twin::points::Layout;
 use crate::twin::{Now, SimulationError, Workspace};
@@ -149,6 +151,32 @@ impl Composed {
         }
     }
 
+    /// Moves the memories of signals inside the twin.
+    pub(super) fn follow(&self, now: &Now<'_>, x: &mut [f64]) {
+        for x in x.chunks_exact_mut(self.states().max(1)) {
+            for (added, part, follows) in self.parts.memories() {
+                if self.parts.moves(now, added.delays) {
+                    let value = self.seen(follows.of, now, x);
+                    let memory = &mut x[added.states.clone()];
+                    (follows.by).next(part.m(now.theta), now.dt, value, memory);
+                }
+            }
+        }
+    }
+
+    /// Value of a signal inside the twin, in one point.
+    fn seen(&self, of: Seen, now: &Now<'_>, x: &[f64]) -> f64 {
+        match of {
+            Seen::State(i) => x[i],
+            Seen::Input(i) => now.u[i],
+            Seen::Output(j) => {
+                let mut y = Theta::from_elem(0.0, self.outputs());
+                self.own_outputs(now, x, &mut y);
+                y[j]
+            }
+        }
+    }
+
     /// Sets the state that a run begins with.
     pub fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         self.resolved(now, |now| {
@@ -178,6 +206,14 @@ impl Composed {
 
     /// Sets the states that follow from the others at the first sample: memories, to the first values of their signals.
     pub(crate) fn begin(&self, now: &Now<'_>, x: &mut [f64]) {
+        if self.parts.acts.in_memories {
+            self.resolved(now, |now| {
+                for (added, _, follows) in self.parts.memories() {
+                    let value = self.seen(follows.of, now, x);
+                    follows.by.begin(value, &mut x[added.states.clone()]);
+                }
+            });
+        }
         if !self.parts.acts.in_sensors {
             return;
         }
@@ -186,6 +222,7 @@ impl Composed {
             self.own_outputs(now, x, &mut y);
             for added in &self.parts.list {
                 if let TwinPart::Law(part) = &added.part
+                    && part.follows.is_none()
                     && !added.states.is_empty()
                 {
                     x[added.states.clone()].fill(y[part.target]);

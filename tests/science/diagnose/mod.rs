@@ -2,6 +2,7 @@
 
 mod black_box;
 mod complete;
+mod memory;
 mod share;
 mod study_of_many;
 mod swallowed;

@@ -8,7 +8,7 @@ fn the_library_makes_sense() {
     let catalogue = Catalogue::default();
     let library = catalogue.kinds();
     let ids: BTreeSet<_> = library.iter().map(|member| member.id()).collect();
-    assert_eq!((library.len(), ids.len()), (30, 30));
+    assert_eq!((library.len(), ids.len()), (37, 37));
     for member in library {
         assert!(
             member.magnitudes().iter().any(|m| m.off.is_some()),
@@ -46,9 +46,9 @@ fn what_may_be_lacking() {
         .iter()
         .map(|t| Catalogue::default().applicable(&t.1).len())
         .collect();
-    // Tanks: 10 sensor, 8 actuator, 2 × (6 forces + 1 coupling + 1 ceiling + 1 noise), 4 × 2 parameters.
+    // Tanks: 13 sensor, 9 actuator, 2 × (7 forces + 1 hysteresis + 1 coupling + 1 ceiling + 1 floor + 1 noise), 4 × 2 parameters.
     // Oscillator: no actuator, one parameter, one cubic spring.
-    assert_eq!(counts, [10 + 8 + 18 + 8, 10 + 18 + 2 + 1, 18, 10]);
+    assert_eq!(counts, [13 + 9 + 24 + 8, 13 + 24 + 2 + 1, 22, 13]);
     let springs: Vec<_> = (twins().iter())
         .flat_map(|t| Catalogue::default().applicable(&t.1))
         .filter(|e| e.id() == "cubic-stiffness")

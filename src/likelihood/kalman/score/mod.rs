@@ -1,6 +1,7 @@
 //! The gradient of the log-likelihood.
 
 mod beside;
+mod response;
 
 use super::order::Order;
 use super::pass::{Innovation, Sink};
@@ -8,6 +9,7 @@ use super::{Coordinates, FilterError, Kalman};
 use crate::math::{LANES, Stencil};
 use beside::{Together, together};
 use nalgebra::{DMatrix, DMatrixView, DVector};
+pub(crate) use response::Responses;
 
 /// Gradient of the log-likelihood in the [`Coordinates`] φ, by central differences (one-sided at a bound); d parameters, N samples.
 ///
