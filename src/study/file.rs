@@ -158,7 +158,7 @@ impl StudyFile {
             equations::take(text, table.get_mut()).map_err(|error| error.in_file(path))?;
         let mut rest: toml::Table = toml::from_str(text).map_err(syntax)?;
         if equations.is_some() {
-            rest.retain(|key, _| !equations::TABLES.contains(&key.as_str()));
+            rest.retain(|key, _| !equations::TABLES.contains(&key));
         }
         check_names(&rest).map_err(|problem| wrong(1, &problem))?;
         if equations.is_none() && !rest.contains_key("twin") {

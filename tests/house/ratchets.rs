@@ -278,7 +278,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 159, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 54_950, lines),
+        Ratchet::new("lines of code", 54_970, lines),
         Ratchet::new("files", 449, files.collect()),
         Ratchet::new("hidden items", 3, hidden(sources)),
         Ratchet::new("methods of StateSpace", 14, methods_of_state_space(sources)),

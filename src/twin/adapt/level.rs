@@ -227,14 +227,14 @@ impl StartLevel {
 )]
 enum StartText {
     Number(f64),
-    Value(StartValue),
+    Value(ValueAt),
     Table(StartTable),
     Word(Word),
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct StartValue {
+struct ValueAt {
     value: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     at: Option<f64>,
@@ -253,7 +253,7 @@ impl From<StartText> for StartLevel {
     fn from(text: StartText) -> Self {
         match text {
             StartText::Number(mean) => Self::known(mean),
-            StartText::Value(StartValue { value, at }) => Self::Declared {
+            StartText::Value(ValueAt { value, at }) => Self::Declared {
                 mean: value,
                 std: 0.0,
                 at,
@@ -276,7 +276,7 @@ impl From<StartLevel> for StartText {
                 mean: value,
                 std: 0.0,
                 at,
-            } => Self::Value(StartValue { value, at }),
+            } => Self::Value(ValueAt { value, at }),
             StartLevel::Declared { mean, std, at } => Self::Table(StartTable { mean, std, at }),
             StartLevel::Estimate => Self::Word(Word::Estimate),
         }
