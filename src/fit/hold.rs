@@ -7,6 +7,7 @@ use super::problem::Problem;
 use super::reference::Reference;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
+use crate::record::Drive;
 use crate::twin::{Hold, Integrator, MOST_SUBSTEPS, Stepping};
 
 /// Nats by which a rule must move the innovations, θ free to answer, to be fitted at all: less is hardly 2 nats of a gain.
@@ -37,10 +38,7 @@ pub(crate) fn other_hold(
     let Some((integrator, own)) = rule.filter(|(rule, _)| *rule != Integrator::Discrete) else {
         return Ok(None);
     };
-    let moves = problem.records.iter().any(|record| {
-        let inputs = record.drive().inputs();
-        inputs.rows().into_iter().any(|row| row != inputs.row(0))
-    });
+    let moves = problem.records.iter().any(|record| moves(record.drive()));
     if !moves {
         return Ok(None);
     }
@@ -84,6 +82,14 @@ pub(crate) fn other_hold(
         }
     }
     Ok(best)
+}
+
+/// Returns whether an input moves in most steps. One that rests is held: on a line from one level to the next, rows would lie between them.
+fn moves(drive: &Drive) -> bool {
+    drive.inputs().columns().into_iter().any(|u| {
+        let steps = u.iter().zip(u.iter().skip(1));
+        2 * steps.filter(|(a, b)| a != b).count() > u.len()
+    })
 }
 
 #[cfg(test)]
@@ -142,6 +148,7 @@ mod tests {
             assert_eq!(asked(Hold::Linear, smooth, seed), Some(Hold::Linear));
             assert_eq!(asked(Hold::Zero, smooth, seed), None);
             assert_eq!(asked(Hold::Linear, |_| 1.0, seed), None);
+            assert_eq!(asked(Hold::Zero, |t| (t / 20.0).floor() % 2.0, seed), None);
         }
     }
 }

@@ -46,7 +46,7 @@ fn a_record_is_read_bit_for_bit_and_checked_as_csv_is() {
     assert_eq!(record.outputs().column(0).to_vec(), y);
     assert_eq!(record.drive().inputs().column(0).to_vec(), [0.0, 1.0, 2.0]);
     let refused = || Record::read(&path).unwrap_err().to_string();
-    write(&path, &[0.0, 0.5, 0.5], &y);
+    write(&path, &[0.0, 0.5, 0.4], &y);
     assert!(
         refused().contains("r.parquet, row 4, column t"),
         "{}",
