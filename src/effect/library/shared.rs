@@ -121,7 +121,7 @@ impl Remember for Deflection {
 
 /// The deflection after a way in widths.
 fn deflected(z: f64, way: f64) -> f64 {
-    let side = sign(way);
+    let side = if way < 0.0 { -1.0 } else { 1.0 };
     let (z, way) = (side * z, way.abs());
     // Against the deflection, a spring; a filter's points may have left ±1.
     let back = clamp(-z, 0.0, way);
