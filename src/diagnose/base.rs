@@ -9,15 +9,14 @@ use crate::effect::{TargetKind, targets};
 use crate::fit::climb::{climb, fit};
 use crate::fit::problem::Problem;
 use crate::fit::starts::growing::base_fit;
-use crate::fit::starts::{Care, search};
-use crate::fit::{ITERATIONS, Passes, spectral_starts};
+use crate::fit::starts::thorough;
+use crate::fit::{ITERATIONS, Passes};
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::search::frequencies::frequencies;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::shared;
 use crate::hypothesis::term::{Part, Term};
-use crate::likelihood::kalman::recoverable;
 use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
@@ -74,10 +73,8 @@ impl Base {
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
-            let mut initial: Vec<Vec<f64>> =
-                initial.iter().map(|theta| problem.full(theta)).collect();
-            initial.extend(spectral_starts(&problem));
-            let found = search(&problem, &initial, starts, ITERATIONS, Care::Thorough)?;
+            let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
+            let found = thorough(&problem, &initial, starts)?;
             found.into_iter().next().map(|fitted| (problem, fitted))
         } else {
             let problem = Problem::of_twin(twin, records).counted_with(passes);
@@ -187,13 +184,11 @@ impl Base {
         let (theta, outline) = (model.theta(), model.problem.outline());
         let records = model.problem.records.clone();
         let inputs: Vec<String> = outline.inputs.iter().map(|u| u.name.clone()).collect();
-        let filtered = match inputs.is_empty() {
-            true => None,
-            false => recoverable(model.problem.filtered(&model.fitted.theta))?,
-        };
+        let seen = model.problem.states(&model.fitted.theta)?;
+        let (filtered, states): (Vec<_>, Vec<_>) = seen.into_iter().unzip();
         Ok(Self {
-            reacting: filtered.map_or(vec![], |all| reacting(&all, &records, &inputs)),
-            scales: Scales::new(&model.base, &theta, records, model.states()?, outline),
+            reacting: reacting(&filtered, &records, &inputs),
+            scales: Scales::new(&model.base, &theta, records, states, outline),
             frequencies: frequencies(&model)?,
             noisy: vec![],
             is_silent: false,

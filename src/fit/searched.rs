@@ -5,8 +5,7 @@ use super::climb::Fitted;
 use super::kinks::over_kinks;
 use super::problem::Problem;
 use super::starts::growing::base_fit;
-use super::starts::spectral_starts;
-use super::starts::{Care, polish, search};
+use super::starts::{polish, thorough};
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use std::collections::BTreeMap;
@@ -41,8 +40,7 @@ pub(crate) fn fits(
     noise: Noise,
 ) -> Result<Vec<Fitted>, FilterError> {
     if !problem.is_simulated() {
-        let initial = [initial, &spectral_starts(problem)].concat();
-        let mut fits = search(problem, &initial, noise, ITERATIONS, Care::Thorough)?;
+        let mut fits = thorough(problem, initial, noise)?;
         if let Some(best) = fits.first_mut() {
             *best = over_kinks(problem, best.clone())?;
         }

@@ -27,6 +27,15 @@ impl Quantity {
             description: String::new(),
         }
     }
+
+    /// Unit of its rate of change.
+    pub(crate) fn rate_unit(&self) -> String {
+        match self.unit.as_str() {
+            "" | "-" | "1" => "1/s".into(),
+            unit if unit.chars().all(char::is_alphanumeric) => format!("{unit}/s"),
+            unit => format!("({unit})/s"),
+        }
+    }
 }
 
 /// The channels of a twin.

@@ -57,11 +57,9 @@ impl Units {
             Some((_, signal)) => signal.unit.as_str(),
             None => self.variable(name),
         };
-        match (self.is_state(name), unit) {
-            (false, unit) => unit.into(),
-            (true, "" | "-" | "1") => "1/s".into(),
-            (true, unit) if unit.chars().all(char::is_alphanumeric) => format!("{unit}/s"),
-            (true, unit) => format!("({unit})/s"),
+        match self.is_state(name) {
+            true => Quantity::new(name, unit).rate_unit(),
+            false => unit.into(),
         }
     }
 

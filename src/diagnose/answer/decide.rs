@@ -90,12 +90,11 @@ impl Answer {
     /// The answer where noise had swallowed what is missing, so that nothing is missing with this probability only: something unknown, at one
     /// of these places if they are known.
     pub fn swallowed(self, nothing: f64, places: Vec<TargetShare>) -> Self {
+        let refuted = self.refuted();
         Self {
             verdict: Verdict::StructuralGap,
-            decision: Decision::NoneOfThese,
-            accepted: vec![],
-            class: vec![],
-            posterior: self.posterior.refuting(nothing, places),
+            posterior: refuted.posterior.with_gap(nothing, places),
+            ..refuted
         }
     }
 

@@ -120,20 +120,24 @@ impl Posterior {
         }
     }
 
-    /// The same where the twin was refuted otherwise, and nothing is missing with this probability only. The places of what is missing are
-    /// these, where any are known.
-    pub fn refuting(self, nothing: f64, places: Vec<TargetShare>) -> Self {
-        let mut posterior = self.without_names();
-        posterior.kinds = Probabilities {
-            nothing,
-            unknown: 1.0 - nothing,
-            ..posterior.kinds
-        };
-        if !places.is_empty() {
-            let places = places.into_iter().map(|t| (t.target, t.probability));
-            posterior.places = places.collect();
+    /// The same without names where a gap was shown otherwise: nothing is missing with this probability, or else something unknown, at one of
+    /// these places where any are known.
+    pub fn with_gap(self, nothing: f64, places: Vec<TargetShare>) -> Self {
+        Self {
+            kinds: Probabilities {
+                nothing,
+                unknown: 1.0 - nothing,
+                ..self.kinds
+            },
+            places: match places.is_empty() {
+                true => self.places,
+                false => places
+                    .into_iter()
+                    .map(|t| (t.target, t.probability))
+                    .collect(),
+            },
+            ..self
         }
-        posterior
     }
 }
 

@@ -14,7 +14,7 @@
 
 use super::{Predictive, Replicate};
 use crate::diagnose::outcome::{Burst, HiddenDisturbance, TargetShare};
-use crate::diagnose::quantify::free_run::mean;
+use crate::diagnose::quantify::free_run::{mean, root};
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::problem::Problem;
@@ -22,7 +22,7 @@ use crate::likelihood::kalman::FilterError;
 use crate::math::{deviation, quantile};
 use crate::record::Record;
 use crate::study::StudyError;
-use crate::twin::{Entry, Role};
+use crate::twin::{Entry, Parameter, Role};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -35,7 +35,7 @@ struct NoisyPlace {
     memories: Vec<usize>,
 }
 
-/// HiddenDisturbance at one place, by record and sample.
+/// Disturbance at one place, by record and sample.
 type Course = Vec<Vec<f64>>;
 
 /// Windows of a scan: their length in samples, and what is summed.
@@ -125,13 +125,9 @@ fn places(problem: &Problem) -> Vec<NoisyPlace> {
     };
     let mut all = vec![];
     for (i, state) in outline.states.iter().enumerate() {
-        let is_own = |p: &crate::twin::Parameter| p.role == Role::Noise && p.target() == state.name;
+        let is_own = |p: &Parameter| p.role == Role::Noise && p.target() == state.name;
         if outline.parameters.iter().any(is_own) {
-            let unit = match state.unit.as_str() {
-                "" | "-" => "1/s".to_owned(),
-                unit => format!("{unit}/s"),
-            };
-            let (name, entry) = (state.name.clone(), Entry::State(i));
+            let (name, unit, entry) = (state.name.clone(), state.rate_unit(), Entry::State(i));
             let memories = memories(entry);
             all.push(NoisyPlace {
                 name,
@@ -186,7 +182,7 @@ fn courses(
 fn clearest(measured: &Course, simulated: &[&Course]) -> Clearest {
     let rms = |course: &Course| {
         let squares: Vec<f64> = course.iter().flatten().map(|v| v * v).collect();
-        mean(&squares).sqrt()
+        root(&squares)
     };
     let sizes: Vec<f64> = simulated.iter().map(|course| rms(course)).collect();
     let mut best = Clearest {

@@ -22,6 +22,7 @@ mod statistics;
 pub(in crate::diagnose) use reference::declared;
 
 use super::outcome::{Predicted, PredictiveCheck};
+use super::quantify::free_run::mean;
 use super::thresholds::Thresholds;
 use crate::fit::posterior::PosteriorSample;
 use crate::fit::problem::Problem;
@@ -152,9 +153,8 @@ fn compare(statistics: &[Discrepancy], measured: &Look, simulated: &[Look]) -> P
     let columns: Vec<(usize, f64, f64)> = (usable.into_iter())
         .filter_map(|s| {
             let values: Vec<f64> = simulated.iter().map(|look| look[s]).collect();
-            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
             let spread = deviation(&values);
-            (spread > 0.0 && spread.is_finite()).then_some((s, mean, spread))
+            (spread > 0.0 && spread.is_finite()).then(|| (s, mean(&values), spread))
         })
         .collect();
     let largest = |look: &Look| {

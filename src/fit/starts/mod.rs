@@ -6,7 +6,7 @@ mod spectral;
 
 pub(crate) use spectral::spectral_starts;
 
-use crate::fit::budget::BUDGET;
+use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
@@ -20,6 +20,16 @@ pub(crate) enum Care {
     Loud,
     /// With quiet noise, too, and more of them where only one ends at the best top.
     Thorough,
+}
+
+/// Fits from `initial`, from where the twin swings as the records do, and all that [`search`] begins from, with thorough care.
+pub(crate) fn thorough(
+    problem: &Problem,
+    initial: &[Vec<f64>],
+    noise: Noise,
+) -> Result<Vec<Fitted>, FilterError> {
+    let initial = [initial, &spectral_starts(problem)].concat();
+    search(problem, &initial, noise, ITERATIONS, Care::Thorough)
 }
 
 /// Fits from the prior's centre, the full θ that are given, and the best of random ones, each to its end; best first.
