@@ -65,7 +65,7 @@ fn a_fit_asks_whether_noise_grows_with_the_signal() {
 #[test]
 fn a_share_is_declared() {
     let text = "twin = 'decay'\n[noise]\nprocess = 'none'\ny = { std = 0.001, share = 0.05 }";
-    let file = StudyFile::parse(&text, "decay.toml".as_ref()).unwrap();
+    let file = StudyFile::parse(text, "decay.toml".as_ref()).unwrap();
     let plan = RecordPlan::autonomous(0.025, 160);
     let study = Study::new("decay", Decay, plan)
         .unwrap()
