@@ -5,7 +5,7 @@ use super::report::Report;
 use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
-use crate::likelihood::start_elsewhere;
+use crate::likelihood::{STANDS, start_elsewhere};
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -80,7 +80,7 @@ pub fn diagnose(
 }
 
 /// Searches again with the start that the twin's code says, where a first row is another one and something is missing: what is missing may bend
-/// the reading of that start, as an offset does. `None` where log Z of all hypotheses is no better for it.
+/// the reading of that start, as an offset does. `None` where listed effects do not explain the records so much better.
 fn trusted<'s>(
     trusting: &'s Study,
     (study, found): (&Study, &Search<Setup<'s>>),
@@ -95,7 +95,8 @@ fn trusted<'s>(
         return Ok(None);
     }
     let other = searched(trusting, records, watch)?;
-    Ok((other.known.log_z() > known.log_z()).then_some(other))
+    let least = known.listed_log_z() + STANDS;
+    Ok((other.known.listed_log_z() > least).then_some(other))
 }
 
 impl Study {

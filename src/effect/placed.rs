@@ -139,6 +139,11 @@ impl Effect {
         self.kind.magnitudes()
     }
 
+    /// Returns the names in θ of magnitudes at which it can be off, and where each is.
+    pub(crate) fn off(&self) -> impl Iterator<Item = (String, f64)> + '_ {
+        (self.magnitudes().iter()).filter_map(|m| Some((self.key.magnitude(m.name), m.off?)))
+    }
+
     /// Returns the table that a file holds of it.
     pub fn entry(&self) -> EffectEntry {
         let other = |key| {

@@ -6,8 +6,9 @@ use super::error::EquationsError;
 use super::graph::{Graph, Id, Varies};
 use super::names::{Meaning, Scope};
 use super::place::{SourceText, number};
+use super::program::{Program, Tapes};
 use super::tape::OperationTape;
-use super::twin::{Equations, Tapes};
+use super::twin::Equations;
 use crate::record::Quantity;
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, message};
@@ -156,13 +157,16 @@ fn read(source: SourceText<'_>, file: &DeTable<'_>) -> Result<Equations, Equatio
     let name = name(source, file)?;
     let graph = &reader.names.graph;
     let tapes = tapes(graph, &states, &outputs);
-    Ok(Equations {
+    let program = Program {
         limits: limits(graph, &states),
-        name,
         outline: reader.outline,
-        tapes: Arc::new(tapes),
+        tapes,
         integrator,
         stepping: Stepping { substeps, hold },
+    };
+    Ok(Equations {
+        name,
+        program: Arc::new(program),
         declared: reader.declared,
         text: written(file).into(),
     })

@@ -23,6 +23,7 @@
 //! | words and signs of an expression; its operations in order | `lexer.rs`, `parser.rs`, `operation.rs` |
 //! | names, definitions, common parts, constants | `names.rs`, `graph.rs` |
 //! | operations over blocks | `tape.rs`, `groups.rs`, `scratch.rs`, `feed.rs` |
+//! | the equations that they are | `program.rs` |
 //! | the twin | `twin.rs`, `declared.rs` |
 
 mod declared;
@@ -37,6 +38,7 @@ mod names;
 mod operation;
 mod parser;
 mod place;
+mod program;
 mod scratch;
 mod tape;
 #[cfg(test)]

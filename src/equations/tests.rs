@@ -4,6 +4,7 @@ use super::Equations;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Composed, DigitalTwin, Noise, Now, StateSpace, Twin};
 use crate::twins::{CascadedTanks, TANKS, VAN_DER_POL, VanDerPol};
+use std::sync::Arc;
 
 #[path = "../../examples/rooms.rs"]
 #[allow(dead_code, clippy::duplicate_mod)]
@@ -36,8 +37,11 @@ fn near(a: f64, b: f64) -> bool {
 fn reference_twins_and_their_texts_are_the_same() {
     for (name, rust, text) in pairs() {
         let outline = rust.outline().unwrap();
-        assert_eq!(outline, text.outline(), "{name}");
-        let (own, other) = (rust.equations().unwrap(), Composed::from(text.clone()));
+        assert_eq!(outline, text.program.outline(), "{name}");
+        let (own, other) = (
+            rust.equations().unwrap(),
+            Arc::new(text.clone()).equations().unwrap(),
+        );
         assert_eq!(own.limits(), other.limits(), "{name}");
         let (n, p) = (outline.states.len(), outline.outputs.len());
         for point in 0..20 {
@@ -201,26 +205,26 @@ fn constants_fold_and_definitions_come_in_any_order() {
     let now = Now::new(3.0, 0.25, &[], &theta);
     let mut dx = [0.0];
     for (h, factor) in [(0.5, 3.0), (1.5, 2.0)] {
-        StateSpace::drift(&twin, &now, &[h], &mut dx);
+        StateSpace::drift(&*twin.program, &now, &[h], &mut dx);
         assert!(near(dx[0], 0.5 * factor * 2.0 * 9.81 - 3.0));
     }
     let (mut start, mut q, mut r, mut y) = ([0.0], [0.0], [0.0], [0.0]);
-    StateSpace::start(&twin, &now, &mut start);
-    StateSpace::noise(&twin, &now, &[-2.0], &mut q, &mut r);
-    StateSpace::observe(&twin, &now, &[4.0], &mut y);
+    StateSpace::start(&*twin.program, &now, &mut start);
+    StateSpace::noise(&*twin.program, &now, &[-2.0], &mut q, &mut r);
+    StateSpace::observe(&*twin.program, &now, &[4.0], &mut y);
     assert_eq!(
         (start, q, r, y),
         ([1.0], [0.2], [0.2], [std::f64::consts::PI])
     );
     let mut h = [7.0];
-    StateSpace::constrain(&twin, &now, &mut h);
+    StateSpace::constrain(&*twin.program, &now, &mut h);
     assert_eq!(h, [2.0], "the limit follows a parameter");
     assert!(twin.declared().known.contains("y") && twin.declared().estimated.is_empty());
     // What is written is read again.
     let again = Equations::parse(twin.text()).unwrap();
     assert_eq!(
-        (again.text(), again.outline()),
-        (twin.text(), twin.outline())
+        (again.text(), again.program.outline()),
+        (twin.text(), twin.program.outline())
     );
 }
 
@@ -275,9 +279,9 @@ fn texts_that_are_nearly_right_do_no_harm() {
         ) {
             Ok(twin) => {
                 accepted += 1;
-                let inputs = twin.outline().inputs.len();
+                let inputs = twin.program.outline().inputs.len();
                 let drive = Drive::new(0.1, Signal::ones((5, inputs))).unwrap();
-                let theta = twin.outline().parameters.centre();
+                let theta = twin.program.outline().parameters.centre();
                 // It may diverge.
                 let _ = twin.simulate(&theta, &drive, Noise::OFF);
             }

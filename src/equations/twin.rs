@@ -1,12 +1,9 @@
 //! The twin of a text.
 
 use super::declared::Declared;
-use super::feed::{LanesFeed, PointsFeed};
-use super::tape::OperationTape;
-use crate::math::{LANES, Lanes};
-use crate::twin::{Blocks, Integrator, Interval, Now, Outline, StateSpace, Stepping};
-use smallvec::SmallVec;
-use std::cell::Cell;
+use super::program::Program;
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::{Composed, DigitalTwin, Noise, ParameterSpace, SimulationError};
 use std::sync::Arc;
 
 /// A twin whose equations are text, as the files of studies have them; cheap to clone.
@@ -40,30 +37,9 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct Equations {
     pub(super) name: String,
-    pub(super) outline: Outline,
-    pub(super) limits: Vec<Interval>,
-    pub(super) integrator: Integrator,
-    pub(super) stepping: Stepping,
     pub(super) declared: Declared,
-    pub(super) tapes: Arc<Tapes>,
+    pub(super) program: Arc<Program>,
     pub(super) text: Arc<str>,
-}
-
-/// Operations of each method.
-#[derive(Debug)]
-pub(super) struct Tapes {
-    pub drift: OperationTape,
-    pub observe: OperationTape,
-    /// Levels of states, then of outputs.
-    pub noise: OperationTape,
-    /// `true` for levels per √s.
-    pub per_second: Vec<bool>,
-    /// States whose start is given.
-    pub given: Vec<usize>,
-    pub start: OperationTape,
-    pub deviation: OperationTape,
-    /// Both ends of the limits of each state, where parameters set one.
-    pub ends: Option<OperationTape>,
 }
 
 impl Equations {
@@ -83,186 +59,34 @@ impl Equations {
     }
 }
 
-/// Numbers of a group of points, those of the narrowest vectors. Twice as many gain nothing below forty points, and functions such as sin
-/// are computed for what fills a group up, too.
-const FEW: usize = 2;
-
-impl OperationTape {
-    /// Computes the outputs of one point.
-    fn point(&self, now: &Now<'_>, x: &[f64], outputs: &mut [f64]) {
-        self.run::<1>(&mut PointsFeed {
-            now,
-            x,
-            stride: x.len(),
-            count: 1,
-            output_stride: outputs.len(),
-            outputs,
-        });
+impl DigitalTwin for Equations {
+    fn parameters(&self) -> ParameterSpace {
+        self.program.parameters()
     }
 
-    /// Computes the outputs of points, `stride` numbers each, to where `output_stride` numbers are of each.
-    fn points(
+    fn signals(&self) -> Signals {
+        self.program.signals()
+    }
+
+    fn simulate(
         &self,
-        now: &Now<'_>,
-        (stride, x): (usize, &[f64]),
-        (output_stride, outputs): (usize, &mut [f64]),
-    ) {
-        let count = x.len() / stride;
-        let mut points = PointsFeed {
-            now,
-            x,
-            stride,
-            count,
-            output_stride,
-            outputs,
-        };
-        match count {
-            0 => {}
-            1 => self.run::<1>(&mut points),
-            _ => self.run::<FEW>(&mut points),
-        }
-    }
-}
-
-impl StateSpace for Equations {
-    fn outline(&self) -> Outline {
-        self.outline.clone()
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        self.program.simulate(theta, drive, noise)
     }
 
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        self.tapes.drift.point(now, x, dx);
+    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        self.program.free_run(theta, drive)
     }
 
-    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        self.tapes.observe.point(now, x, y);
-    }
-
-    fn start(&self, now: &Now<'_>, x: &mut [f64]) {
-        // States without a start are left alone: theirs is unknown.
-        let mut starts = SmallVec::<[f64; 16]>::from_elem(0.0, self.limits.len());
-        self.tapes.start.point(now, &[], &mut starts);
-        for &state in &self.tapes.given {
-            x[state] = starts[state];
-        }
-    }
-
-    fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]) {
-        self.tapes.deviation.point(now, &[], std);
-    }
-
-    fn noise(&self, now: &Now<'_>, x: &[f64], process: &mut [f64], measurement: &mut [f64]) {
-        let n = process.len();
-        match &self.tapes.noise.fixed {
-            Some(levels) => {
-                process.copy_from_slice(&levels[..n]);
-                measurement.copy_from_slice(&levels[n..]);
-            }
-            None => {
-                let all = n + measurement.len();
-                let mut levels = SmallVec::<[f64; 16]>::from_elem(0.0, all);
-                self.tapes.noise.point(now, x, &mut levels);
-                process.copy_from_slice(&levels[..n]);
-                measurement.copy_from_slice(&levels[n..]);
-            }
-        }
-        let root = now.dt.sqrt();
-        for (level, is_per_second) in process.iter_mut().zip(&self.tapes.per_second) {
-            if *is_per_second {
-                *level *= root;
-            }
-        }
-    }
-
-    fn limits(&self) -> Vec<Interval> {
-        self.limits.clone()
-    }
-
-    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        let Some(tape) = &self.tapes.ends else {
-            return;
-        };
-        let mut ends = vec![0.0; 2 * x.len()];
-        tape.point(now, &[], &mut ends);
-        for (x, ends) in x.iter_mut().zip(ends.as_chunks::<2>().0) {
-            // Ends in the wrong order leave a state alone: θ that crosses them is for the prior to exclude.
-            if ends[0] < ends[1] {
-                *x = Interval::unchecked(ends[0], ends[1]).clamp(*x);
-            }
-        }
-    }
-
-    fn integrator(&self) -> Integrator {
-        self.integrator
-    }
-
-    fn stepping(&self) -> Stepping {
-        self.stepping
-    }
-
-    fn blocks(&self) -> Option<&dyn Blocks> {
+    fn equations(self: Arc<Self>) -> Option<Composed> {
+        let program = self.program.clone();
         // Constraints act on one state after the other.
-        self.tapes.ends.is_none().then_some(self)
-    }
-}
-
-impl Blocks for Equations {
-    fn drift(&self, now: &Now<'_>, stride: usize, x: &[f64], dx: &mut [f64]) {
-        self.tapes.drift.points(now, (stride, x), (stride, dx));
-    }
-
-    fn observe(&self, now: &Now<'_>, stride: usize, x: &[f64], y: &mut [f64]) {
-        let outputs = self.outline.outputs.len();
-        match &self.tapes.observe.plain {
-            Some(states) => {
-                for (x, y) in x.chunks_exact(stride).zip(y.chunks_exact_mut(outputs)) {
-                    for (y, state) in y.iter_mut().zip(states) {
-                        *y = x[*state];
-                    }
-                }
-            }
-            None => self.tapes.observe.points(now, (stride, x), (outputs, y)),
-        }
-    }
-
-    fn step_lanes(&self, now: &[Now<'_>], x: &mut [Lanes]) {
-        let states = self.limits.len();
-        let points = x.len() / states;
-        let steps: [f64; LANES] = std::array::from_fn(|lane| now.get(lane).unwrap_or(&now[0]).dt);
-        let x = Cell::from_mut(x).as_slice_of_cells();
-        let is_discrete = self.integrator == Integrator::Discrete;
-        self.tapes.drift.run(&mut LanesFeed {
-            now,
-            points,
-            states,
-            load: |index: usize| x[index].get(),
-            take: |point: usize, state: usize, values: Lanes| {
-                let cell = &x[point * states + state];
-                let before = cell.get();
-                cell.set(Lanes(std::array::from_fn(|lane| {
-                    let (x, dt) = (before.0[lane], steps[lane]);
-                    match is_discrete {
-                        true => x + dt * ((values.0[lane] - x) / dt),
-                        false => x + dt * values.0[lane],
-                    }
-                })));
-            },
-        });
-    }
-
-    fn observe_lanes(&self, now: &[Now<'_>], x: &[Lanes], y: &mut [Lanes]) {
-        let states = self.limits.len();
-        if let Some(plain) = &self.tapes.observe.plain {
-            for (x, y) in x.chunks_exact(states).zip(y) {
-                *y = x[plain[0]];
-            }
-            return;
-        }
-        self.tapes.observe.run(&mut LanesFeed {
-            now,
-            points: x.len() / states,
-            states,
-            load: |index: usize| x[index],
-            take: |point: usize, _: usize, values: Lanes| y[point] = values,
-        });
+        Some(match program.tapes.ends {
+            Some(_) => Composed::new(program),
+            None => Composed::in_blocks(program),
+        })
     }
 }

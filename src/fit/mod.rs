@@ -13,6 +13,7 @@
 //! | `climb.rs`, `kinks.rs` | the most probable θ, also where the likelihood has kinks |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `evidence.rs` | the likelihood averaged over the prior |
+//! | `profile.rs` | what the records alone say of a parameter |
 //! | `hold.rs` | the rule for inputs between samples that the records ask for |
 //! | `reference.rs` | linear gain of a direction beside θ |
 //! | `doubts.rs` | reasons to doubt a result, in one list |
@@ -32,6 +33,7 @@ pub(crate) mod least_squares;
 mod outcome;
 pub(crate) mod posterior;
 pub(crate) mod problem;
+mod profile;
 pub(crate) mod reference;
 mod run;
 mod score;
@@ -48,6 +50,8 @@ pub use outcome::{
     OutputErrors, Warning,
 };
 pub use posterior::Posterior;
+pub use profile::Profile;
+pub(crate) use profile::ProfilesOf;
 pub(crate) use run::{Subject, run};
 pub use score::FitScore;
 pub(crate) use score::score;

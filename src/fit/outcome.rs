@@ -2,6 +2,7 @@
 
 use super::certificate::Side;
 use super::posterior::{Posterior, PosteriorRegion};
+use super::profile::Profile;
 use crate::record::Signal;
 use crate::twin::{Noise, Role, Stepping};
 use serde::Serialize;
@@ -15,6 +16,8 @@ pub struct FitSettings {
     pub level: f64,
     /// Number of posterior draws to return; each costs four likelihoods, of a black box an ensemble of simulations each.
     pub draws: usize,
+    /// Profile likelihoods of all parameters; otherwise only of those whose posterior the prior shapes.
+    pub profile: bool,
 }
 
 impl FitSettings {
@@ -30,6 +33,7 @@ impl Default for FitSettings {
             seed: 1,
             level: 0.9,
             draws: 0,
+            profile: false,
         }
     }
 }
@@ -59,6 +63,8 @@ pub struct Fit {
     /// Draws of everything unknown, where they were asked for.
     #[serde(skip)]
     pub posterior: Option<Posterior>,
+    /// Profile likelihoods: of all parameters where they were asked for, otherwise of those whose intervals they are.
+    pub profiles: Vec<Profile>,
     /// Substeps, and the rule for inputs between samples, that the fit used in place of the twin's, as the records ask for; none otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stepping: Option<Stepping>,
@@ -87,12 +93,15 @@ pub struct FittedValue {
     pub unit: String,
     /// Most probable value.
     pub value: f64,
-    /// Standard error, first order.
+    /// Standard error, first order; with the interval, not a number where the search has not arrived.
     pub std_error: f64,
     /// Lower end of the interval, which holds the value.
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
+    /// `true` where the interval is that of the profile likelihood, since the prior pulls the value by a quarter of its error, or makes the interval 5 %
+    /// narrower; otherwise it is that of the posterior.
+    pub by_profile: bool,
     /// The bound that the value lies at.
     pub at_bound: Option<Side>,
 }

@@ -8,12 +8,13 @@ use super::follow::{errors, free_runs, starts, swallowed};
 use super::outcome::{Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue};
 use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
 use super::problem::Problem;
+use super::profile::{ProfilesOf, profiles};
 use super::searched::Searched;
 use super::starts::polish;
 use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, Measured};
-use crate::twin::{Noise, Role, Twin};
+use crate::twin::{Interval, Noise, Role, Twin};
 use std::time::Instant;
 
 /// Subject of a fit: a twin in its study's setting.
@@ -26,7 +27,7 @@ pub(crate) struct Subject<'a> {
 pub(crate) fn run(
     measured: &Measured,
     searched: Searched,
-    settings: &FitSettings,
+    (settings, which): (&FitSettings, ProfilesOf),
 ) -> Result<Option<Fit>, FilterError> {
     let clock = Instant::now();
     let noise = settings.noise();
@@ -50,7 +51,16 @@ pub(crate) fn run(
     };
     let evidence = evidence(&problem, &fitted, &draws, noise.child("evidence"))?;
     let spread = FitIntervals::new(&problem, &fitted, &draws.thetas, settings.level);
-    let (parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
+    let (mut parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
+    let (profiles, shaped) = profiles(&problem, &fitted, (which, settings.level))?;
+    for value in parameters.iter_mut().filter(|v| shaped.contains(&v.name)) {
+        let own = profiles.iter().find(|profile| profile.name == value.name);
+        if let Some((own, bounds)) = own.zip(bounds(&problem, &value.name)) {
+            value.low = own.low.unwrap_or(bounds.low()).min(value.value);
+            value.high = own.high.unwrap_or(bounds.high()).max(value.value);
+            value.by_profile = true;
+        }
+    }
     let smoothed = problem.smoothed(&fitted.theta)?;
     let free_runs = free_runs(&problem, &fitted.theta, &smoothed)?;
     let starts = starts(&problem, &smoothed);
@@ -68,6 +78,12 @@ pub(crate) fn run(
     };
     let ends = without.is_none_or(|base| fitted.log_likelihood > base - BUDGET.below_without);
     convergence.converged &= ends;
+    if !convergence.converged {
+        // An error about a point that is no top says nothing.
+        for value in &mut parameters {
+            (value.std_error, value.low, value.high) = (f64::NAN, f64::NAN, f64::NAN);
+        }
+    }
     let mut doubts = Doubts::new(&problem, &fitted.theta);
     doubts.below(without.filter(|_| !ends), fitted.log_likelihood);
     doubts.search(&convergence);
@@ -95,6 +111,7 @@ pub(crate) fn run(
         posterior: (asked.is_some())
             .then(|| table(&problem, &draws, noise.child("starts")))
             .transpose()?,
+        profiles,
         stepping: None,
         samples: problem.samples(),
         seconds: clock.elapsed().as_secs_f64(),
@@ -103,6 +120,12 @@ pub(crate) fn run(
             .collect(),
         free_runs,
     }))
+}
+
+/// Bounds of a parameter.
+fn bounds(problem: &Problem, name: &str) -> Option<Interval> {
+    let space = problem.twin.parameters();
+    space.iter().find(|p| p.name == name).map(|p| p.bounds)
 }
 
 /// Posterior draws; where one of them is better than the best fit, another search begins there: the likelihood has kinks that no slope
@@ -169,6 +192,7 @@ fn values(
             // At a bound, draws may lie on one side of the value alone.
             low: spread.low[j].min(fitted.theta[j]),
             high: spread.high[j].max(fitted.theta[j]),
+            by_profile: false,
             at_bound: certificate.at_bound[j],
         });
     }

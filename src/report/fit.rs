@@ -1,17 +1,18 @@
 //! A fit as JSON and as a document.
 
-use super::chart::pair_plot;
-use super::digits::{own_unit, percent, short, unit_suffix, with_error, with_unit};
+use super::chart::{Line, Panel, Style, TimeMark, chart, pair_plot};
+use super::digits::{in_unit, own_unit, percent, short, unit_suffix, with_error, with_unit};
 use super::document::Column::{Number, Text};
 use super::document::{Block, Document, Picture, Section};
 use super::parameters::{ParameterRow, priors, values};
 use super::record::overlay_svg;
 use super::residuals::{Left, residual_blocks};
-use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Side};
+use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Profile, Side};
 use crate::record::Record;
 use crate::study::Study;
 use crate::twin::{Parameter, ParameterSpace};
 use serde_json::{Value, json};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// The fit as one JSON object, `truetwin.fit/1`.
 ///
@@ -21,6 +22,7 @@ use serde_json::{Value, json};
 /// | `noise` | fitted levels: states in units per √s, outputs in their own, `y.share` the share of \|y\| that is added to that of `y`; `declared` is null where nothing was declared; `at_bound` as of parameters |
 /// | `starts` | states at the first sample of each record, given all of it |
 /// | `level` | level of the intervals |
+/// | `profiles` | profile likelihoods: name, unit, values, log-likelihoods below the highest, ends of the interval, null where a bound is inside |
 /// | `log_likelihood`, `evidence` | in nats; `evidence.std_error` is null where Laplace's approximation stands alone |
 /// | `convergence` | `converged`; `distance` to the top in standard deviations; `agreeing` of `searches` |
 /// | `errors` | of each output: root mean square of one-step and free-run errors, deviation of the record; `correlation` of one-step errors with the row before |
@@ -39,6 +41,7 @@ pub(super) fn fit_json(study: &Study, fit: &Fit) -> Value {
                 let mut line = json!(line);
                 line["low"] = json!(p.low);
                 line["high"] = json!(p.high);
+                line["by_profile"] = json!(p.by_profile);
                 line
             })
             .collect();
@@ -86,6 +89,10 @@ pub(super) fn fit_document(study: &Study, records: &[Record], fit: &Fit) -> Docu
         .brief(levels(fit)),
         Section::new("errors", "Errors and convergence", vec![]).brief(quality(fit)),
     ];
+    if !fit.profiles.is_empty() {
+        let block = Block::picture(profiles_svg(study, fit), PROFILES);
+        sections.push(Section::new("profiles", "Profile likelihoods", vec![block]));
+    }
     sections.extend(fit.posterior.as_ref().map(|p| draws(study, p)));
     let others: Vec<Block> = pictures
         .map(|svg| Block::picture(svg, "A further record."))
@@ -120,6 +127,45 @@ pub(super) fn fit_document(study: &Study, records: &[Record], fit: &Fit) -> Docu
     }
 }
 
+/// Caption of profiles.
+const PROFILES: &str = "The highest log-likelihood at each value of a parameter, everything else answering, without the prior. The interval ends \
+where a curve falls below the line; a curve that stays above it up to a bound of the parameter leaves that side open.";
+
+/// A picture of profile likelihoods, one below the other.
+pub(crate) fn profiles_svg(study: &Study, fit: &Fit) -> String {
+    let depth = ChiSquared::new(1.0).map_or(f64::NAN, |c| -0.5 * c.inverse_cdf(fit.level));
+    let panel = |profile: &Profile| {
+        let points: Vec<(f64, f64)> = (profile.values.iter().copied())
+            .zip(profile.log_likelihoods.iter().copied())
+            .collect();
+        let ends = points.first().zip(points.last());
+        let line = ends.map_or(vec![], |(first, last)| {
+            vec![(first.0, depth), (last.0, depth)]
+        });
+        let fitted = fit.parameters.iter().find(|p| p.name == profile.name);
+        let mark = fitted.map(|p| TimeMark {
+            x: p.value,
+            label: "fit".into(),
+        });
+        let level = format!("{:.0} % interval", 100.0 * fit.level);
+        let series = vec![
+            Line::new(&level, Style::ZERO, line),
+            Line::new("profile", Style::AFTER, points),
+        ];
+        let panel = Panel::new("log-likelihood below the top, nats", series).height(110.0);
+        let name = format!("{}{}", profile.name, in_unit(&profile.unit));
+        (name, vec![panel.marks(mark.into_iter().collect())])
+    };
+    let axes: Vec<_> = fit.profiles.iter().map(panel).collect();
+    let title = format!("{}: profile likelihoods", study.name());
+    let names: Vec<&str> = fit.profiles.iter().map(|p| p.name.as_str()).collect();
+    let description = format!(
+        "One curve each of {}, with the line that ends intervals.",
+        names.join(", ")
+    );
+    chart(&title, &description, &axes)
+}
+
 /// The largest free-run error of an output over its deviation; none where a free run diverges.
 fn off(fit: &Fit) -> Option<f64> {
     let each = fit.errors.iter().map(|e| Some(e.free_run? / e.deviation));
@@ -149,8 +195,15 @@ fn headline(fit: &Fit) -> String {
 
 /// Fitted noise levels and starts.
 fn levels(fit: &Fit) -> Vec<Block> {
+    let stands = |error: f64| {
+        if fit.convergence.converged {
+            error
+        } else {
+            f64::NAN
+        }
+    };
     let noise = |level: &FittedNoise| {
-        let [value, error] = with_error(level.value, level.std_error);
+        let [value, error] = with_error(level.value, stands(level.std_error));
         vec![
             match level.name.strip_suffix(".share") {
                 Some(output) => format!("{output}, share of |{output}|"),
@@ -169,7 +222,7 @@ fn levels(fit: &Fit) -> Vec<Block> {
             true => format!(" (record {})", start.record),
             false => String::new(),
         };
-        let [value, error] = with_error(start.value, start.std_error);
+        let [value, error] = with_error(start.value, stands(start.std_error));
         let unit = own_unit(&start.unit).to_owned();
         vec![start.name.clone() + &record, value, error, unit]
     };
@@ -286,6 +339,7 @@ fn described(p: &FittedValue, space: &ParameterSpace) -> ParameterRow {
     });
     ParameterRow {
         at_bound,
+        by_profile: p.by_profile,
         ..ParameterRow::new(&own, p.value, p.std_error, [p.low, p.high])
     }
 }

@@ -36,6 +36,9 @@ pub(super) struct ParameterRow {
     /// The value itself owes this share to the prior: it is an estimate of a network that has learnt the prior.
     #[serde(skip)]
     pub leans: bool,
+    /// The interval is that of the profile likelihood.
+    #[serde(skip)]
+    pub by_profile: bool,
     #[serde(skip)]
     pub role: Role,
     /// Values at other stages, in the order of their names.
@@ -54,9 +57,11 @@ impl ParameterRow {
             interval,
             prior: parameter.prior,
             bounds: parameter.bounds,
-            prior_share: (std_error / prior).powi(2).min(1.0),
+            // Not a number where there is no error.
+            prior_share: (std_error / prior).powi(2).clamp(0.0, 1.0),
             at_bound: parameter.bound_at(value, std_error),
             leans: false,
+            by_profile: false,
             role: parameter.role,
             stages: vec![],
         }
@@ -87,6 +92,7 @@ impl ParameterRow {
     /// Remark: the note, or else how much of the prior is left in the value.
     fn remark(&self) -> String {
         match (self.note(), self.role) {
+            ("", _) if self.by_profile => "interval by profile".to_owned(),
             ("", Role::Parameter) if self.prior_share >= LEANING => {
                 let share = digits::percent(self.prior_share);
                 match self.leans {
@@ -140,7 +146,10 @@ pub(super) fn values(caption: &str, level: f64, rows: &[ParameterRow]) -> Block 
             row.label(),
             digits.write(row.value),
             digits::error(row.std_error),
-            format!("[{low}, {high}]"),
+            match row.interval.iter().all(|end| end.is_nan()) {
+                true => "–".to_owned(),
+                false => format!("[{low}, {high}]"),
+            },
             digits::own_unit(&row.unit).to_owned(),
             row.remark(),
         ]

@@ -3,10 +3,12 @@
 use super::{Study, StudyError};
 use crate::effect::Effect;
 use crate::equations::Declared;
-use crate::fit::{Fit, FitScore, FitSettings, Subject, Warning, other_hold, run, score};
+use crate::fit::{
+    Fit, FitScore, FitSettings, ProfilesOf, Subject, Warning, other_hold, run, score,
+};
 use crate::hypothesis::search::asked::with_asked_noise;
 use crate::hypothesis::search::effects::searched;
-use crate::likelihood::{Beliefs, measured};
+use crate::likelihood::{Beliefs, STANDS, measured};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
@@ -55,10 +57,10 @@ impl Study {
         self.fit_asking(true, records, settings, progress)
     }
 
-    /// As [`fit_with`](Self::fit_with); without asking, noise levels stay as they depend on the states in the twin.
+    /// As [`fit_with`](Self::fit_with); without asking, noise levels stay as they depend on the states in the twin, and nothing is profiled.
     pub(crate) fn fit_asking(
         &self,
-        asks_for_noise: bool,
+        asks: bool,
         records: &[Record],
         settings: &FitSettings,
         progress: &Progress,
@@ -76,31 +78,58 @@ impl Study {
         Record::check_outputs(records, &self.twin.signals().outputs)?;
         let clock = Instant::now();
         let study = self.for_records(records)?;
-        let effects = study.added_effects()?;
         let stage = progress.stage("fit", 1);
-        let noise = settings.noise();
-        let fitted = |twin: &Twin| -> Result<_, StudyError> {
-            let measured = measured(twin, records, &study.beliefs())?;
-            let searched = searched(&measured, &effects, records.into(), noise)?;
-            Ok((measured, searched))
-        };
-        let (mut measured, mut searched) = fitted(&study.twin)?;
-        let other = match searched.fits.first() {
-            Some(best) if study.asks_hold() => other_hold(&searched.problem, best)?,
-            _ => None,
-        };
-        if let Some(twin) = other.and_then(|other| study.with_steps(other.stepping)) {
-            (measured, searched) = fitted(&twin)?;
+        let (mut fit, elsewhere) = study.fit_once(asks, records, settings)?;
+        if elsewhere && !self.file.effect.is_empty() {
+            // An effect of the study may be what bends the reading of the start.
+            let (trusting, _) = (study.trusting_starts()).fit_once(asks, records, settings)?;
+            let log_z = |fit: &Fit| Some(fit.evidence.as_ref()?.log_evidence);
+            let gain = log_z(&trusting)
+                .zip(log_z(&fit))
+                .map(|(held, given_up)| held - given_up);
+            if gain.is_some_and(|gain| gain > STANDS) {
+                fit = trusting;
+            }
         }
-        if asks_for_noise {
-            searched = with_asked_noise(&measured, searched, noise)?;
-        }
-        let mut fit = run(&measured, searched, settings)?.ok_or(StudyError::NoFit)?;
-        fit.stepping = other.map(|other| other.stepping);
-        (fit.warnings).extend(other.map(|other| Warning::hold(other.stepping, Some(other.gain))));
         fit.seconds = clock.elapsed().as_secs_f64();
         stage.tick()?;
         Ok(fit)
+    }
+
+    /// The fit with one rule for starts, and whether a start that was said is given up in it.
+    fn fit_once(
+        &self,
+        asks: bool,
+        records: &[Record],
+        settings: &FitSettings,
+    ) -> Result<(Fit, bool), StudyError> {
+        let effects = self.added_effects()?;
+        let noise = settings.noise();
+        let fitted = |twin: &Twin| -> Result<_, StudyError> {
+            let measured = measured(twin, records, &self.beliefs())?;
+            let searched = searched(&measured, &effects, records.into(), noise)?;
+            Ok((measured, searched))
+        };
+        let (mut measured, mut searched) = fitted(&self.twin)?;
+        let other = match searched.fits.first() {
+            Some(best) if self.asks_hold() => other_hold(&searched.problem, best)?,
+            _ => None,
+        };
+        if let Some(twin) = other.and_then(|other| self.with_steps(other.stepping)) {
+            (measured, searched) = fitted(&twin)?;
+        }
+        if asks {
+            searched = with_asked_noise(&measured, searched, noise)?;
+        }
+        let which = match (asks, settings.profile) {
+            (_, true) => ProfilesOf::All,
+            (true, false) => ProfilesOf::Shaped,
+            (false, false) => ProfilesOf::None,
+        };
+        let mut fit = run(&measured, searched, (settings, which))?.ok_or(StudyError::NoFit)?;
+        fit.stepping = other.map(|other| other.stepping);
+        (fit.warnings).extend(other.map(|other| Warning::hold(other.stepping, Some(other.gain))));
+        Ok((fit, measured.elsewhere.is_some()))
     }
 
     /// Scores a fit of this study on a record that it has not seen: log density of its rows, one-step and free-run errors.
@@ -166,6 +195,10 @@ impl Study {
             factors: own.factors,
             estimated: own.estimated,
             trusts_code: self.trusts_starts,
+            // Effects of a study are resolved when it is made.
+            off: (self.added_effects().unwrap_or_default().iter())
+                .flat_map(Effect::off)
+                .collect(),
             wide: (starts.clone())
                 .filter(|(_, level)| !matches!(level, StartLevel::Declared { std: 0.0, .. }))
                 .map(|(name, _)| name.clone())

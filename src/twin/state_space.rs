@@ -2,7 +2,7 @@
 
 use crate::record::{Quantity, Signals};
 use crate::twin::{
-    Blocks, Integrator, Interval, Now, Parameter, ParameterSpace, SimulationError, Stepping,
+    Integrator, Interval, Now, Parameter, ParameterSpace, SimulationError, Stepping,
 };
 
 /// A twin given by its equations
@@ -106,12 +106,6 @@ pub trait StateSpace: Send + Sync {
     /// changes them: `[record] substeps` and `hold`.
     fn stepping(&self) -> Stepping {
         Stepping::default()
-    }
-
-    /// The same equations for many points in one call, where that is faster; none by default.
-    #[doc(hidden)]
-    fn blocks(&self) -> Option<&dyn Blocks> {
-        None
     }
 }
 

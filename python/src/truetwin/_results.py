@@ -52,9 +52,11 @@ class Fit(Result):
     std_errors : dict of str to float or None
         Standard errors; None where the record gives none.
     intervals : dict of str to (float, float)
-        Intervals of probability `level`.
+        Intervals of probability `level`; a parameter has none where the search has not arrived.
     level : float
         Probability that an interval holds the parameter.
+    profiles : dict of str to (list of float, list of float)
+        Profile likelihoods: values of a parameter, and the log-likelihood at each below the highest.
     noise : dict of str to float
         Fitted standard deviations of process and measurement noise.
     at_bound : tuple of str
@@ -69,6 +71,7 @@ class Fit(Result):
     std_errors: Mapping[str, float | None]
     intervals: Mapping[str, tuple[float, float]]
     level: float
+    profiles: Mapping[str, tuple[list[float], list[float]]]
     noise: Mapping[str, float]
     at_bound: tuple[str, ...]
     converged: bool
@@ -82,8 +85,9 @@ class Fit(Result):
             report=report,
             parameters={p["name"]: p["value"] for p in fitted},
             std_errors={p["name"]: p["std_error"] for p in fitted},
-            intervals={p["name"]: (p["low"], p["high"]) for p in fitted},
+            intervals={p["name"]: (p["low"], p["high"]) for p in fitted if p["low"] is not None},
             level=raw["level"],
+            profiles={p["name"]: (p["values"], p["log_likelihoods"]) for p in raw["profiles"]},
             noise={n["name"]: n["value"] for n in raw["noise"]},
             at_bound=tuple(p["name"] for p in fitted if p["at_bound"] is not None),
             converged=raw["convergence"]["converged"],

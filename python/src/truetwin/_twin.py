@@ -166,6 +166,7 @@ class Twin:
         self,
         records: Records,
         *,
+        profile: bool = False,
         columns: Mapping[str, str] | None = None,
         seed: int = 1,
         out: Path_ | None = None,
@@ -177,6 +178,8 @@ class Twin:
         records : record or sequence of records
             A path of a CSV file, a DataFrame, or a dict of arrays, with the columns ``t`` and the names of inputs and outputs. nan
             marks outputs that were not measured. A record without ``t`` has the twin's step.
+        profile : bool, optional
+            Profile likelihood of every parameter, as curves and on the page; otherwise of those alone that the prior shapes.
         columns : dict of str to str, optional
             Column of the record for each name in the twin, as in ``{"t": "time", "push": "torque"}``.
         seed : int, optional
@@ -190,7 +193,8 @@ class Twin:
         """
         with _Call(self) as call:
             files = call.records(records, columns)
-            folder, text = call.folder("fit", [*files, *call.subject(), *call.columns(columns)], seed, out)
+            options = [*call.subject(), *call.columns(columns), *(["--profile"] if profile else [])]
+            folder, text = call.folder("fit", [*files, *options], seed, out)
             pictures = sorted(folder.glob("overlay*.svg"), key=lambda path: (len(path.name), path.name))
             report = Report(text, pictures=tuple(path.read_text(encoding="utf-8") for path in pictures))
             return Fit._of(_json(folder / "fit.json"), report)

@@ -20,6 +20,10 @@ pub(in crate::cli) struct Fit {
     columns: FileColumns,
     #[command(flatten)]
     draws: PosteriorDraws,
+    /// Profile likelihood of each parameter, in fit.json and on the page. Without this, of those alone whose posterior the prior shapes:
+    /// their intervals are those of the profile.
+    #[arg(long)]
+    profile: bool,
     /// New folder for fit.json, the page report.html and a picture of each record (overlay.svg, overlay-2.svg, …).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -33,6 +37,7 @@ impl Verb for Fit {
         let settings = FitSettings {
             seed: context.seed,
             draws: self.draws.count()?,
+            profile: self.profile,
             ..FitSettings::default()
         };
         let fit = study.fit_with(&records, &settings, context.progress)?;

@@ -27,7 +27,8 @@ pub(in crate::diagnose) struct Budget {
     pub starts: usize,
     /// Most functions that are fitted to all rows, alone and beside a set.
     pub functions_of_all_rows: usize,
-    /// Explanations of a kind that are tried with a finer step before a search with it.
+    /// Explanations of a kind that are tried with a finer step before a search with it: a few passes each. With three, a spring whose gain the step's
+    /// error hides stays behind three effects with a memory that imitate both; twelve find no more.
     pub step_trials: usize,
     /// Most kinds of noise that are added to the twin's own.
     pub kinds_of_noise: usize,
@@ -48,7 +49,7 @@ impl Default for Budget {
             least_second: 3.0,
             starts: 2,
             functions_of_all_rows: 2,
-            step_trials: 3,
+            step_trials: 6,
             kinds_of_noise: 2,
         }
     }

@@ -81,6 +81,16 @@ impl Explanations {
         self.twin().log_z + self.posterior().log_evidence
     }
 
+    /// log Z of the listed effect or pair that explains most, the price of a second one paid.
+    pub fn listed_log_z(&self) -> f64 {
+        let pairs = self
+            .pairs()
+            .into_iter()
+            .map(|e| e.log_z - self.price().of(2));
+        let singles = self.listed().into_iter().map(|e| e.log_z);
+        pairs.chain(singles).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Those that others have as well.
     pub fn among(&self, others: &Self) -> Self {
         let mut both = self.clone();

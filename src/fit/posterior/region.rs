@@ -109,7 +109,7 @@ fn first_order(problem: &Problem, fitted: &Fitted, own: usize) -> (DVector<f64>,
 mod tests {
     use super::*;
     use crate::fit::climb::climb;
-    use crate::fit::{FitSettings, Searched, run};
+    use crate::fit::{FitSettings, ProfilesOf, Searched, run};
     use crate::likelihood::{Beliefs, measured};
     use crate::record::{Drive, Record};
     use crate::twin::{DigitalTwin, Noise, Twin};
@@ -154,7 +154,8 @@ mod tests {
                 let measured = measured(&twin, &records, &beliefs).unwrap();
                 let problem = Problem::of_measured(&measured, records);
                 let searched = Searched::alone(problem, noise).unwrap();
-                let fit = run(&measured, searched, &FitSettings::default());
+                let settings = FitSettings::default();
+                let fit = run(&measured, searched, (&settings, ProfilesOf::None));
                 let region = fit.unwrap().unwrap().region.unwrap();
                 ((region.theta[0] - 1.5) / region.axes[(0, 0)]).powi(2)
             })

@@ -109,13 +109,12 @@ fn opened(model: &Model, terms: &[Arc<Term>]) -> (Problem, BTreeMap<String, f64>
             let Part::Effect { effect, .. } = &term.part else {
                 continue;
             };
+            let ends: BTreeMap<String, f64> = effect.off().collect();
             let entries = term.entries.iter().flatten();
             for (&j, axis) in entries.zip(&term.axes) {
                 axes[j] = axis.clone();
-                let m = (effect.magnitudes().iter())
-                    .find(|m| effect.key().magnitude(m.name) == space[j].name);
-                if let Some(end) = m.and_then(|m| m.off) {
-                    off.insert(space[j].name.clone(), axis.bounds.clamp(end));
+                if let Some(end) = ends.get(&space[j].name) {
+                    off.insert(space[j].name.clone(), axis.bounds.clamp(*end));
                 }
             }
         }

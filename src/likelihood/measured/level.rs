@@ -42,6 +42,8 @@ pub(crate) struct Beliefs {
     pub estimated: BTreeSet<String>,
     /// `true` where the code's word on starts stands, whatever the first rows say.
     pub trusts_code: bool,
+    /// Magnitudes of effects of the study, by their names in θ, where each effect is off.
+    pub off: BTreeMap<String, f64>,
 }
 
 /// An output whose first value is not that of the start.

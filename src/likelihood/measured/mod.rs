@@ -20,6 +20,7 @@ mod tests;
 
 pub(crate) use level::{Beliefs, Level, Measured, StartElsewhere};
 pub(crate) use share::{LARGEST_SHARE, share_name, with_share};
+pub(crate) use start::STANDS;
 
 use super::ensemble;
 use super::kalman::FilterError;

@@ -10,8 +10,7 @@ use crate::twin::points::{
     readout_lanes, readout_one_by_one,
 };
 use crate::twin::{
-    DigitalTwin, Integrator, Interval, Noise, Now, ParameterSpace, SimulationError, StateSpace,
-    Workspace,
+    DigitalTwin, Integrator, Noise, Now, ParameterSpace, SimulationError, StateSpace, Workspace,
 };
 use std::sync::Arc;
 
@@ -75,22 +74,12 @@ pub(crate) trait Engine: StateSpace {
 
 impl<T: StateSpace> Engine for T {
     fn drift_points(&self, now: &Now<'_>, at: Layout, x: &[f64], dx: &mut [f64]) {
-        if let Some(blocks) = self.blocks() {
-            blocks.drift(now, at.stride, x, dx);
-            for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
-                as_rates(self, now, x, dx);
-            }
-            return;
-        }
         for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
             rates(self, now, x, dx);
         }
     }
 
     fn observe_points(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
-        if let Some(blocks) = self.blocks() {
-            return blocks.observe(now, at.stride, x, y);
-        }
         for (i, y) in y.chunks_exact_mut(p).enumerate() {
             self.observe(now, &x[i * at.stride..][..at.states], y);
         }
@@ -116,9 +105,6 @@ impl<T: StateSpace> Engine for T {
     }
 
     fn advance_points(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
-        if self.blocks().is_some() {
-            return together(self, now, points, work);
-        }
         // Loops of known length, for the sizes of most twins.
         let advance = |x: &mut [f64]| step(self, now, x, work);
         let constrain = |x: &mut [f64]| self.constrain(now, x);
@@ -139,15 +125,6 @@ impl<T: StateSpace> Engine for T {
         one: (&mut [f64], &mut [f64]),
         work: &mut Workspace,
     ) -> [bool; LANES] {
-        if let Some(blocks) = self.blocks()
-            && work.is_plain()
-        {
-            let n = points.shifts.len();
-            let x = &mut points.all[..points.moving * n];
-            limit_lanes(points.limits, x);
-            blocks.step_lanes(now, x);
-            return [false; LANES];
-        }
         let advance = |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
         match points.shifts.len() {
             1 => lanes_one_by_one(1, now, points, one, advance),
@@ -165,10 +142,6 @@ impl<T: StateSpace> Engine for T {
         y: &mut [Lanes],
         buffer: &mut [f64],
     ) {
-        if let Some(blocks) = self.blocks() {
-            let points = 1 + 2 * n;
-            return blocks.observe_lanes(now, &x[..points * n], &mut y[..points]);
-        }
         let observe = |now: &Now<'_>, x: &[f64], y: &mut [f64]| {
             self.observe_points(now, Layout::dense(n), 1, x, y);
         };
@@ -279,43 +252,16 @@ fn carry<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Works
 #[inline(always)]
 fn rates<T: StateSpace>(twin: &T, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
     twin.drift(now, x, dx);
-    as_rates(twin, now, x, dx);
+    if twin.integrator() == Integrator::Discrete {
+        as_rates(now, x, dx);
+    }
 }
 
 /// Turns the next state of a twin in discrete time into rates: forces of effects and memories of sensors have rates, too.
 #[inline(always)]
-fn as_rates<T: StateSpace>(twin: &T, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-    if twin.integrator() == Integrator::Discrete {
-        for (dx, x) in dx.iter_mut().zip(x) {
-            *dx = (*dx - x) / now.dt;
-        }
-    }
-}
-
-/// Carries the points of a filter as one long state, of equations that take all at once and constrain none.
-fn together<T: StateSpace>(
-    twin: &T,
-    now: &Now<'_>,
-    mut points: Points<'_>,
-    work: &mut Workspace,
-) -> bool {
-    let n = points.shifts.len();
-    points.limit(n);
-    let moving = &mut points.all[..points.moving * n];
-    let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
-        twin.drift_points(now, Layout::dense(n), x, dx);
-    };
-    work.carry(n, now, moving, drift);
-    false
-}
-
-/// Puts points of several filters into their limits.
-fn limit_lanes(limits: &[Interval], x: &mut [Lanes]) {
-    let limits_felt = (limits.iter().enumerate()).filter(|(_, l)| **l != Interval::EVERYTHING);
-    for (i, limit) in limits_felt {
-        for x in x.iter_mut().skip(i).step_by(limits.len()) {
-            x.0.iter_mut().for_each(|x| *x = limit.clamp(*x));
-        }
+pub(super) fn as_rates(now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+    for (dx, x) in dx.iter_mut().zip(x) {
+        *dx = (*dx - x) / now.dt;
     }
 }
 

@@ -8,7 +8,7 @@
 //! | outputs, starts and inputs | `signals.rs` |
 //! | noise levels, starts from outside | `noise.rs` |
 //! | inputs that act; the loop of a run | `simulation.rs` |
-//! | a user's equations, compiled for all points of a step | `engine.rs` |
+//! | a user's equations, compiled for all points of a step; those that take all in one call | `engine.rs`, `own.rs` |
 //! | the trait of all simulators; the same parts over whole signals of a black box | `digital_twin.rs`, `black_box.rs`, `known_noise.rs` |
 
 mod black_box;
@@ -17,6 +17,7 @@ mod engine;
 mod known_noise;
 mod motion;
 mod noise;
+mod own;
 mod part;
 mod parts;
 mod signals;
@@ -35,10 +36,10 @@ pub(crate) use simulation::{Acting, DeadTime, check_start};
 use crate::record::{Drive, Signal};
 use crate::twin::integrator::felt;
 use crate::twin::{
-    Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace, Stepping,
-    Workspace,
+    Blocks, Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
+    Stepping, Workspace,
 };
-use engine::Engine;
+use own::OwnEquations;
 pub(in crate::twin) use parts::Parts;
 pub(in crate::twin) use parts::Theta;
 use simulation::{RunSetup, check_lengths, simulate};
@@ -60,7 +61,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone)]
 pub struct Composed {
-    own: Arc<dyn Engine>,
+    own: OwnEquations,
     parts: Arc<Parts>,
 }
 
@@ -81,6 +82,15 @@ impl From<&Composed> for Composed {
 impl Composed {
     /// Returns a user's equations, without parts.
     pub fn new<T: StateSpace + 'static>(own: Arc<T>) -> Self {
+        Self::without_parts(OwnEquations::one_by_one(own))
+    }
+
+    /// Returns equations that take all points of a step in one call, without parts.
+    pub(crate) fn in_blocks<T: StateSpace + Blocks + 'static>(own: Arc<T>) -> Self {
+        Self::without_parts(OwnEquations::in_blocks(own))
+    }
+
+    fn without_parts(own: OwnEquations) -> Self {
         let rule = (own.integrator(), own.stepping());
         let parts = Arc::new(Parts::none(own.outline(), own.limits(), rule));
         Self { own, parts }
@@ -115,7 +125,7 @@ impl Composed {
 
     /// Returns whether this is another handle of the same twin.
     pub(crate) fn is(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.own, &other.own) && Arc::ptr_eq(&self.parts, &other.parts)
+        self.own.is_same(&other.own) && Arc::ptr_eq(&self.parts, &other.parts)
     }
 
     /// Returns the time that the start belongs to, on the record's own clock; `None` for that of the first row.

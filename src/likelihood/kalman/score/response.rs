@@ -6,8 +6,8 @@
 //! ```
 //!
 //! A, C: derivatives of a step and of the outputs along the filtered states; K: the filter's gain, from the covariances of the same
-//! linear model. d: an addition that is held over a step, to a rate (B = ½Δt·(A + I)), an input or the logarithm of a parameter
-//! (differences); e: an addition to an output.
+//! linear model. d: an addition that is held over a step, to a rate (B = ½Δt·(A + I); an Euler step has Δt·I, 4 % more at 0.08 time constants),
+//! an input or the logarithm of a parameter (differences); e: an addition to an output.
 //!
 //! One run along the record serves any number of additions, each of which then costs a small product a row in place of a filter's pass. That
 //! is a screen, not a likelihood: what changes covariances is left out.
@@ -355,7 +355,7 @@ impl Linearisation<'_> {
 mod tests {
     use super::*;
     use crate::record::{Drive, Record};
-    use crate::twin::{DigitalTwin, Noise, Outline, Parameter, StateSpace};
+    use crate::twin::{DigitalTwin, Integrator, Noise, Outline, Parameter, StateSpace};
 
     /// ẋ = k·(u + f − x), y = x + e: f and e are parameters that are off.
     struct ForcedLag;
@@ -378,6 +378,9 @@ mod tests {
         }
         fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
             (process[0], measurement[0]) = (0.05, 0.1);
+        }
+        fn integrator(&self) -> Integrator {
+            Integrator::RungeKutta4
         }
     }
 

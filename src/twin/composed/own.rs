@@ -1,0 +1,128 @@
+//! A twin's own equations under all parts: called point after point, or for all points at once where they offer that.
+
+use super::engine::{Engine, as_rates};
+use crate::math::{LANES, Lanes};
+use crate::twin::points::{Layout, Points, lanes_one_by_one};
+use crate::twin::{Blocks, Integrator, Interval, Now, StateSpace, Workspace};
+use std::ops::Deref;
+use std::sync::Arc;
+
+/// The equations, and how many points of them are computed; what is not defined here is done point after point.
+#[derive(Clone)]
+pub(super) struct OwnEquations {
+    engine: Arc<dyn Engine>,
+    /// The same equations for many points in one call.
+    blocks: Option<Arc<dyn Blocks>>,
+}
+
+impl Deref for OwnEquations {
+    type Target = dyn Engine;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.engine
+    }
+}
+
+impl OwnEquations {
+    pub fn one_by_one<T: StateSpace + 'static>(own: Arc<T>) -> Self {
+        Self {
+            engine: own,
+            blocks: None,
+        }
+    }
+
+    pub fn in_blocks<T: StateSpace + Blocks + 'static>(own: Arc<T>) -> Self {
+        Self {
+            engine: own.clone(),
+            blocks: Some(own),
+        }
+    }
+
+    pub fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.engine, &other.engine)
+    }
+
+    pub fn drift_points(&self, now: &Now<'_>, at: Layout, x: &[f64], dx: &mut [f64]) {
+        let Some(blocks) = &self.blocks else {
+            return self.engine.drift_points(now, at, x, dx);
+        };
+        blocks.drift(now, at.stride, x, dx);
+        if self.engine.integrator() == Integrator::Discrete {
+            for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
+                as_rates(now, x, dx);
+            }
+        }
+    }
+
+    pub fn observe_points(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
+        match &self.blocks {
+            Some(blocks) => blocks.observe(now, at.stride, x, y),
+            None => self.engine.observe_points(now, at, p, x, y),
+        }
+    }
+
+    pub fn advance_points(
+        &self,
+        now: &Now<'_>,
+        mut points: Points<'_>,
+        work: &mut Workspace,
+    ) -> bool {
+        if self.blocks.is_none() {
+            return self.engine.advance_points(now, points, work);
+        }
+        let n = points.shifts.len();
+        points.limit(n);
+        let moving = &mut points.all[..points.moving * n];
+        work.carry(n, now, moving, |now, x, dx| {
+            self.drift_points(now, Layout::dense(n), x, dx);
+        });
+        false
+    }
+
+    pub fn advance_lanes(
+        &self,
+        now: &[Now<'_>],
+        points: Points<'_, Lanes>,
+        one: (&mut [f64], &mut [f64]),
+        work: &mut Workspace,
+    ) -> [bool; LANES] {
+        let Some(blocks) = &self.blocks else {
+            return self.engine.advance_lanes(now, points, one, work);
+        };
+        let n = points.shifts.len();
+        if !work.is_plain() {
+            let advance =
+                |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
+            return lanes_one_by_one(n, now, points, one, advance);
+        }
+        let x = &mut points.all[..points.moving * n];
+        limit_lanes(points.limits, x);
+        blocks.step_lanes(now, x);
+        [false; LANES]
+    }
+
+    pub fn observe_lanes(
+        &self,
+        now: &[Now<'_>],
+        n: usize,
+        x: &[Lanes],
+        y: &mut [Lanes],
+        buffer: &mut [f64],
+    ) {
+        let Some(blocks) = &self.blocks else {
+            return self.engine.observe_lanes(now, n, x, y, buffer);
+        };
+        let points = 1 + 2 * n;
+        blocks.observe_lanes(now, &x[..points * n], &mut y[..points]);
+    }
+}
+
+/// Puts points of several filters into their limits.
+fn limit_lanes(limits: &[Interval], x: &mut [Lanes]) {
+    let limits_felt = (limits.iter().enumerate()).filter(|(_, l)| **l != Interval::EVERYTHING);
+    for (i, limit) in limits_felt {
+        for x in x.iter_mut().skip(i).step_by(limits.len()) {
+            x.0.iter_mut().for_each(|x| *x = limit.clamp(*x));
+        }
+    }
+}
