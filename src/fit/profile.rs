@@ -34,6 +34,8 @@ const NOTHING: f64 = 1e-6;
 const PARTS: f64 = 3.0;
 /// Fits on a side, at most: steps double, so that with half of them a parameter that is not identified ends early at a thousand errors.
 const MOST: usize = 20;
+/// Points on a side, at least: a curve of fewer has corners.
+const LEAST: usize = 6;
 /// Secants to an end, at most, and the error of √(max ℓ − ℓ) that is small enough: a hundredth of a standard error.
 const SECANTS: usize = 4;
 const CLOSE: f64 = 0.007;
@@ -218,7 +220,30 @@ impl Profiled {
             }
             step *= (1.0 / rise.max(0.0)).clamp(0.5, 2.0);
         }
+        self.fill(&held, j, &mut points)?;
         Ok(points)
+    }
+
+    /// Puts points into the widest gaps between the top and the end.
+    fn fill(
+        &self,
+        held: &Problem,
+        j: usize,
+        points: &mut Vec<ProfilePoint>,
+    ) -> Result<(), FilterError> {
+        let top = self.problem.coordinates.of(&self.top.theta);
+        while (1..LEAST).contains(&points.len()) {
+            let before = |i: usize| if i == 0 { &top } else { &points[i - 1].phi };
+            let gap = |i: &usize| (points[*i].phi[j] - before(*i)[j]).abs();
+            let widest = (0..points.len()).max_by(|a, b| gap(a).total_cmp(&gap(b)));
+            let i = widest.unwrap_or(0);
+            let middle = 0.5 * (points[i].phi[j] + before(i)[j]);
+            let Some(point) = self.fitted(held, (j, middle), [&points[i].phi, before(i)])? else {
+                break;
+            };
+            points.insert(i, point);
+        }
+        Ok(())
     }
 
     /// Puts a point near the end of the interval between the last two.

@@ -52,6 +52,12 @@ pub(crate) fn run(
     let evidence = evidence(&problem, &fitted, &draws, noise.child("evidence"))?;
     let spread = FitIntervals::new(&problem, &fitted, &draws.thetas, settings.level);
     let (mut parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
+    let arrived = arrived && certificate.has_converged();
+    // Beside a point that is no top nothing is stated, and so nothing profiled unasked.
+    let which = match which {
+        ProfilesOf::Shaped if !arrived => ProfilesOf::None,
+        which => which,
+    };
     let (profiles, shaped) = profiles(&problem, &fitted, (which, settings.level))?;
     for value in parameters.iter_mut().filter(|v| shaped.contains(&v.name)) {
         let own = profiles.iter().find(|profile| profile.name == value.name);
@@ -71,7 +77,7 @@ pub(crate) fn run(
     };
     let errors = errors(&problem, &fitted.theta, &free_runs)?;
     let mut convergence = Convergence {
-        converged: arrived && certificate.has_converged(),
+        converged: arrived,
         distance: certificate.distance,
         agreeing: certificate.agreeing,
         searches: certificate.searches,

@@ -276,16 +276,16 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     let files = sources.sources.values();
     let files = files.map(|source| source.file.display().to_string());
     vec![
-        Ratchet::new("public items", 159, items.collect()),
+        Ratchet::new("public items", 160, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 54_970, lines),
-        Ratchet::new("files", 449, files.collect()),
-        Ratchet::new("hidden items", 3, hidden(sources)),
-        Ratchet::new("methods of StateSpace", 14, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 461, constants(sources)),
+        Ratchet::new("lines of code", 55_500, lines),
+        Ratchet::new("files", 452, files.collect()),
+        Ratchet::new("hidden items", 2, hidden(sources)),
+        Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
+        Ratchet::new("named numeric constants", 469, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
-            4,
+            3,
             wide_functions(sources, 6),
         ),
         Ratchet::new(

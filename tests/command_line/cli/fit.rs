@@ -3,21 +3,18 @@
 use super::{done, json, refused, truetwin};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
-fn place() -> PathBuf {
-    let name = format!("fit-{}", std::process::id());
-    let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    fs::create_dir_all(&place).unwrap();
-    place
+fn place() -> TempDir {
+    tempfile::tempdir().unwrap()
 }
 
 #[test]
 fn a_record_is_fitted_and_bad_calls_are_refused() {
     let place = place();
-    let at = |name: &str| place.join(name).display().to_string();
+    let at = |name: &str| place.path().join(name).display().to_string();
     let study = |name: &str, tables: &str| {
-        fs::write(place.join(name), format!("twin = 'tanks'\n{tables}")).unwrap();
+        fs::write(place.path().join(name), format!("twin = 'tanks'\n{tables}")).unwrap();
         at(name)
     };
     let (record, out) = (at("r.csv"), at("out"));
@@ -33,7 +30,9 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
     assert_eq!(value["convergence"]["converged"], true);
     let k1 = &value["parameters"][0];
     assert!((k1["value"].as_f64().unwrap() - 0.6).abs() < 5.0 * k1["std_error"].as_f64().unwrap());
-    assert!(place.join("out/fit.json").exists() && place.join("out/overlay.svg").exists());
+    assert!(
+        place.path().join("out/fit.json").exists() && place.path().join("out/overlay.svg").exists()
+    );
     let text = done(&["fit", &record, "--twin", "tanks"]);
     for part in [
         "k1",
@@ -109,17 +108,16 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
         let study = study("bad.toml", tables);
         refused(&["fit", &record, "--study", &study], &parts);
     }
-    fs::remove_dir_all(&place).unwrap();
 }
 
 #[test]
 fn an_input_that_never_moves_is_warned_of() {
     let place = place();
-    let at = |name: &str| place.join(name).display().to_string();
+    let at = |name: &str| place.path().join(name).display().to_string();
     let rows: String = (0..200)
         .map(|k| format!("{},2\n", 0.5 * f64::from(k)))
         .collect();
-    fs::write(place.join("still-input.csv"), format!("t,u\n{rows}")).unwrap();
+    fs::write(place.path().join("still-input.csv"), format!("t,u\n{rows}")).unwrap();
     let (input, record) = (at("still-input.csv"), at("still.csv"));
     let theta = "k1=0.6,k2=0.5,k3=0.55,k4=1";
     let simulate = ["simulate", "--twin", "tanks", "--theta", theta];
@@ -134,13 +132,34 @@ fn an_input_that_never_moves_is_warned_of() {
     assert!(codes(&value).contains(&"constant-input"), "{value}");
 }
 
+/// Asked for, the profile of a parameter is in the JSON, with an interval that holds the truth and the fit.
+#[test]
+fn profiles_are_asked_for() {
+    let place = place();
+    let record = place.path().join("R.csv").display().to_string();
+    let simulate = ["simulate", "--twin", "van-der-pol", "--theta", "nu=1.3"];
+    done(&[&simulate[..], &["--out", &record]].concat());
+    let call = ["fit", &record, "--twin", "van-der-pol", "--json"];
+    assert_eq!(json(&call)["profiles"], serde_json::json!([]));
+    let fit = json(&[&call[..], &["--profile"]].concat());
+    let profile = &fit["profiles"][0];
+    assert_eq!(profile["name"], "nu");
+    let [low, high] = ["low", "high"].map(|end| profile[end].as_f64().unwrap());
+    let value = fit["parameters"][0]["value"].as_f64().unwrap();
+    assert!(
+        low < value && value < high && low < 1.3 && 1.3 < high,
+        "{profile}"
+    );
+    assert_eq!(fit["parameters"][0]["by_profile"], false);
+}
+
 /// Half of a step of 2 s moves the tanks by more than their noise.
 #[test]
 fn a_long_step_is_told() {
     let place = place();
-    let at = |name: &str| place.join(name).display().to_string();
+    let at = |name: &str| place.path().join(name).display().to_string();
     let study = |name: &str, tables: &str| {
-        fs::write(place.join(name), format!("twin = 'tanks'\n{tables}")).unwrap();
+        fs::write(place.path().join(name), format!("twin = 'tanks'\n{tables}")).unwrap();
         at(name)
     };
     let theta = "k1=0.6,k2=0.5,k3=0.55,k4=1";
