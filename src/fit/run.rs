@@ -8,13 +8,14 @@ use super::follow::{errors, free_runs, starts, swallowed};
 use super::outcome::{Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue};
 use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
 use super::problem::Problem;
-use super::profile::{ProfilesOf, profiles};
+use super::profile::{Profile, ProfilesOf, profiles};
 use super::searched::Searched;
 use super::starts::polish;
 use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, Measured};
-use crate::twin::{Interval, Noise, Role, Twin};
+use crate::twin::{Noise, Role, Twin};
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 /// Subject of a fit: a twin in its study's setting.
@@ -58,15 +59,8 @@ pub(crate) fn run(
         ProfilesOf::Shaped if !arrived => ProfilesOf::None,
         which => which,
     };
-    let (profiles, shaped) = profiles(&problem, &fitted, (which, settings.level))?;
-    for value in parameters.iter_mut().filter(|v| shaped.contains(&v.name)) {
-        let own = profiles.iter().find(|profile| profile.name == value.name);
-        if let Some((own, bounds)) = own.zip(bounds(&problem, &value.name)) {
-            value.low = own.low.unwrap_or(bounds.low()).min(value.value);
-            value.high = own.high.unwrap_or(bounds.high()).max(value.value);
-            value.by_profile = true;
-        }
-    }
+    let profiled = profiles(&problem, &fitted, (which, settings.level))?;
+    let profiles = stated(&problem, profiled, &mut parameters);
     let smoothed = problem.smoothed(&fitted.theta)?;
     let free_runs = free_runs(&problem, &fitted.theta, &smoothed)?;
     let starts = starts(&problem, &smoothed);
@@ -128,10 +122,26 @@ pub(crate) fn run(
     }))
 }
 
-/// Bounds of a parameter.
-fn bounds(problem: &Problem, name: &str) -> Option<Interval> {
+/// States the intervals of profiles for the named parameters; a side without an end reaches to the bound.
+fn stated(
+    problem: &Problem,
+    (profiles, named): (Vec<Profile>, BTreeSet<String>),
+    parameters: &mut [FittedValue],
+) -> Vec<Profile> {
     let space = problem.twin.parameters();
-    space.iter().find(|p| p.name == name).map(|p| p.bounds)
+    for value in parameters.iter_mut().filter(|v| named.contains(&v.name)) {
+        let own = profiles.iter().find(|profile| profile.name == value.name);
+        let bounds = space
+            .iter()
+            .find(|p| p.name == value.name)
+            .map(|p| p.bounds);
+        if let Some((own, bounds)) = own.zip(bounds) {
+            value.low = own.low.unwrap_or(bounds.low()).min(value.value);
+            value.high = own.high.unwrap_or(bounds.high()).max(value.value);
+            value.by_profile = true;
+        }
+    }
+    profiles
 }
 
 /// Posterior draws; where one of them is better than the best fit, another search begins there: the likelihood has kinks that no slope

