@@ -91,15 +91,14 @@ pub fn study(data: &[u8]) -> Result<(), String> {
 
 /// A study file with equations, up to a short simulation of the study that it makes.
 pub fn equations(data: &[u8]) -> Result<(), String> {
-    let text = std::str::from_utf8(data).map_err(text)?;
-    let file = StudyFile::parse(text, Path::new("equations.toml")).map_err(self::text)?;
-    if file.own_equations().is_none() {
+    let found = StudyFile::read(&file("equations.toml", data)).map_err(text)?;
+    if found.own_equations().is_none() {
         return Ok(());
     }
-    let study = Study::of_file(&file).map_err(self::text)?;
+    let study = Study::of_file(&found).map_err(text)?;
     let twin = study.twin();
     let inputs = ndarray::Array2::ones((4, twin.signals().inputs.len()));
-    let drive = Drive::new(0.1, inputs).map_err(self::text)?;
+    let drive = Drive::new(0.1, inputs).map_err(text)?;
     // It may diverge.
     let _ = twin.simulate(
         &twin.parameters().centre(),
