@@ -63,7 +63,7 @@ pub struct Fit {
     /// Draws of everything unknown, where they were asked for.
     #[serde(skip)]
     pub posterior: Option<Posterior>,
-    /// Profile likelihoods: of all parameters where they were asked for, otherwise of those whose intervals they are.
+    /// Profile likelihoods: of all parameters where they were asked for, otherwise of those whose intervals hold theirs.
     pub profiles: Vec<Profile>,
     /// Substeps, and the rule for inputs between samples, that the fit used in place of the twin's, as the records ask for; none otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -99,8 +99,8 @@ pub struct FittedValue {
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
-    /// `true` where the interval is that of the profile likelihood, since the prior pulls the value by a quarter of its error, or makes the interval 5 %
-    /// narrower; otherwise it is that of the posterior.
+    /// `true` where the interval holds that of the profile likelihood beside that of the posterior, since the prior pulls the value by a quarter of
+    /// its error, or makes the interval 5 % narrower.
     pub by_profile: bool,
     /// The bound that the value lies at.
     pub at_bound: Option<Side>,

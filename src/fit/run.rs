@@ -122,7 +122,7 @@ pub(crate) fn run(
     }))
 }
 
-/// States the intervals of profiles for the named parameters; a side without an end reaches to the bound.
+/// States intervals that hold both that of the posterior and that of the profile, for the named parameters; a side without an end reaches to the bound.
 fn stated(
     problem: &Problem,
     (profiles, named): (Vec<Profile>, BTreeSet<String>),
@@ -136,8 +136,8 @@ fn stated(
             .find(|p| p.name == value.name)
             .map(|p| p.bounds);
         if let Some((own, bounds)) = own.zip(bounds) {
-            value.low = own.low.unwrap_or(bounds.low()).min(value.value);
-            value.high = own.high.unwrap_or(bounds.high()).max(value.value);
+            value.low = own.low.unwrap_or(bounds.low()).min(value.low);
+            value.high = own.high.unwrap_or(bounds.high()).max(value.high);
             value.by_profile = true;
         }
     }

@@ -51,11 +51,11 @@ fn intervals_cover_where_the_prior_shapes_the_posterior() {
     assert!(all >= 40 && held + 48 >= all + 38, "{held} of {all}");
 }
 
-/// Intervals of 24 records hold the truth as often as they say; noise levels come out within a third.
+/// Intervals of 12 records hold the truth as often as they say; noise levels come out within a third.
 #[test]
 fn intervals_cover_and_noise_levels_are_found() {
     let (mut held, mut all) = (0, 0);
-    for seed in 0..24 {
+    for seed in 0..12 {
         let fit = fitted(&tanks(), &[simulated(seed)]);
         assert!(fit.convergence.converged, "{:?}", fit.convergence);
         for (p, truth) in fit.parameters.iter().zip(TRUTH) {
@@ -65,8 +65,8 @@ fn intervals_cover_and_noise_levels_are_found() {
         let y = fit.noise.iter().find(|level| level.name == "y").unwrap();
         assert!((y.value / 0.15).ln().abs() < 0.3, "{y:?}");
     }
-    // 96 intervals at 0.9, four alike to a record: 86 ± 5.9.
-    assert!(held >= 72, "{held} of {all}");
+    // 48 intervals at 0.9, four to a record: 43 ± 2.1 if independent, ± 4.2 if four alike.
+    assert!(held >= 35, "{held} of {all}");
 }
 
 /// Beside steps of five times the noise, intervals of 20 records hold the truth as often as they say, and the step itself is found.

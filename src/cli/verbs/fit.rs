@@ -21,7 +21,7 @@ pub(in crate::cli) struct Fit {
     #[command(flatten)]
     draws: PosteriorDraws,
     /// Profile likelihood of each parameter, in fit.json and on the page. Without this, of those alone whose posterior the prior shapes:
-    /// their intervals are those of the profile.
+    /// their intervals hold those of the profile, too.
     #[arg(long)]
     profile: bool,
     /// New folder for fit.json, the page report.html and a picture of each record (overlay.svg, overlay-2.svg, …).
