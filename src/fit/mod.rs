@@ -51,7 +51,7 @@ pub use outcome::{
 };
 pub use posterior::Posterior;
 pub use profile::Profile;
-pub(crate) use profile::ProfilesOf;
+pub(crate) use profile::{ProfilesOf, depth};
 pub(crate) use run::{Subject, run};
 pub use score::FitScore;
 pub(crate) use score::score;

@@ -74,28 +74,27 @@ pub(super) fn profiles(
     fitted: &Fitted,
     (which, level): (ProfilesOf, f64),
 ) -> Result<(Vec<Profile>, BTreeSet<String>), FilterError> {
-    let is_asked = match which {
-        ProfilesOf::None => false,
-        ProfilesOf::Shaped => !problem.is_simulated(),
-        ProfilesOf::All => true,
-    };
-    if !is_asked {
-        return Ok((vec![], BTreeSet::new()));
-    }
     let shaped = shaped(problem, fitted);
     let entries = match which {
         ProfilesOf::All => entries(problem),
-        _ => shaped.clone(),
+        ProfilesOf::Shaped if !problem.is_simulated() => shaped.clone(),
+        _ => vec![],
     };
-    if entries.is_empty() {
-        return Ok((vec![], BTreeSet::new()));
-    }
-    let Some(profiled) = Profiled::new(problem, fitted)? else {
+    let profiled = match entries.is_empty() {
+        true => None,
+        false => Profiled::new(problem, fitted)?,
+    };
+    let Some(profiled) = profiled else {
         return Ok((vec![], BTreeSet::new()));
     };
     let space = problem.twin.parameters();
     let names = shaped.iter().map(|&j| space[j].name.clone()).collect();
     Ok((profiled.of(&entries, level)?, names))
+}
+
+/// Nats below its top at which a profile leaves an interval of this level.
+pub(crate) fn depth(level: f64) -> f64 {
+    ChiSquared::new(1.0).map_or(f64::NAN, |c| 0.5 * c.inverse_cdf(level))
 }
 
 /// Entries that are profiled: the free ones that are no noise level.
@@ -174,7 +173,7 @@ impl Profiled {
 
     /// The profiles of these entries, with intervals of this level.
     fn of(&self, entries: &[usize], level: f64) -> Result<Vec<Profile>, FilterError> {
-        let depth = ChiSquared::new(1.0).map_or(f64::NAN, |c| 0.5 * c.inverse_cdf(level));
+        let depth = depth(level);
         let sides = entries.iter().flat_map(|&j| [(j, -1.0), (j, 1.0)]);
         let sides: Vec<Vec<ProfilePoint>> = (sides.collect::<Vec<_>>().into_par_iter())
             .map(|(j, sign)| self.side(j, sign, depth))

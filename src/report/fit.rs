@@ -7,12 +7,11 @@ use super::document::{Block, Document, Picture, Section};
 use super::parameters::{ParameterRow, priors, values};
 use super::record::overlay_svg;
 use super::residuals::{Left, residual_blocks};
-use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Profile, Side};
+use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Profile, Side, depth};
 use crate::record::Record;
 use crate::study::Study;
 use crate::twin::{Parameter, ParameterSpace};
 use serde_json::{Value, json};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// The fit as one JSON object, `truetwin.fit/1`.
 ///
@@ -128,20 +127,19 @@ pub(super) fn fit_document(study: &Study, records: &[Record], fit: &Fit) -> Docu
 }
 
 /// Caption of profiles.
-const PROFILES: &str = "The highest log-likelihood at each value of a parameter, everything else answering, without the prior. The interval ends \
-where a curve falls below the line; a curve that stays above it up to a bound of the parameter leaves that side open.";
+const PROFILES: &str = "The highest log-likelihood at each value of a parameter, everything else answering, without the prior. \
+The interval of the profile ends where a curve falls below the line; a curve that stays above it up to a bound of the parameter leaves that \
+side open.";
 
 /// A picture of profile likelihoods, one below the other.
 pub(crate) fn profiles_svg(study: &Study, fit: &Fit) -> String {
-    let depth = ChiSquared::new(1.0).map_or(f64::NAN, |c| -0.5 * c.inverse_cdf(fit.level));
+    let end = -depth(fit.level);
     let panel = |profile: &Profile| {
         let points: Vec<(f64, f64)> = (profile.values.iter().copied())
             .zip(profile.log_likelihoods.iter().copied())
             .collect();
         let ends = points.first().zip(points.last());
-        let line = ends.map_or(vec![], |(first, last)| {
-            vec![(first.0, depth), (last.0, depth)]
-        });
+        let line = ends.map_or(vec![], |(first, last)| vec![(first.0, end), (last.0, end)]);
         let fitted = fit.parameters.iter().find(|p| p.name == profile.name);
         let mark = fitted.map(|p| TimeMark {
             x: p.value,

@@ -36,7 +36,7 @@ pub(super) struct ParameterRow {
     /// The value itself owes this share to the prior: it is an estimate of a network that has learnt the prior.
     #[serde(skip)]
     pub leans: bool,
-    /// The interval is that of the profile likelihood.
+    /// The interval holds that of the profile likelihood.
     #[serde(skip)]
     pub by_profile: bool,
     #[serde(skip)]

@@ -28,7 +28,7 @@ pub(in crate::diagnose) struct Budget {
     /// Most functions that are fitted to all rows, alone and beside a set.
     pub functions_of_all_rows: usize,
     /// Explanations of a kind that are tried with a finer step before a search with it: a few passes each. With three, a spring whose gain the step's
-    /// error hides stays behind three effects with a memory that imitate both; twelve find no more.
+    /// error hides stays behind three effects with a memory that imitate both.
     pub step_trials: usize,
     /// Most kinds of noise that are added to the twin's own.
     pub kinds_of_noise: usize,

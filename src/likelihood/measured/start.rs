@@ -4,7 +4,7 @@
 //! elsewhere, at an operating point, say:
 //!
 //! ```text
-//! |y(0) − g(x_0, θ)| > 5·s   for all θ within the bounds, effects off          s: declared noise of the output, or what its second differences show
+//! |y(0) − g(x_0, θ)| > 5·s   for all θ within the bounds, effects off     s: declared noise of the output, or what its second differences show
 //! ```
 
 use super::level::{Beliefs, StartElsewhere};
@@ -17,8 +17,7 @@ use crate::twin::{Acting, Composed, Now, Role, is_memory};
 /// given up in one of eighty records; at twice of it a wrong one of ten deviations is believed.
 const ELSEWHERE: f64 = 5.0;
 /// Nats by which records must be better explained with a start that their first rows contradict for it to stand: something is then missing that bends
-/// these rows, with prior odds of 1 to 20. With half of it a heater's start is kept and its sensor is said to stop below; with twice of it an offset of
-/// a sensor passes for a force.
+/// these rows, with prior odds of 1 to 20. With twice of it an offset of a sensor, better by 5.8, passes for a force.
 pub(crate) const STANDS: f64 = 3.0;
 /// Median absolute second difference of white noise, in its standard deviations: 0.6745·√6.
 const SECOND_DIFFERENCE: f64 = 1.652;
