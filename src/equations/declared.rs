@@ -118,7 +118,8 @@ impl Declared {
         keys: &DeTable<'_>,
         names: &mut Scope<'_>,
     ) -> Result<StartValue, EquationsError> {
-        const OF: &str = "a start can name parameters, constants and definitions of these";
+        const OF: &str =
+            "a start is before all rows; name parameters, constants and definitions of these alone";
         let zero = names.graph.number(0.0);
         let mut start = StartValue {
             mean: zero,

@@ -178,7 +178,10 @@ impl<'a, 't> TableEntry<'a, 't> {
     ) -> Result<T, EquationsError> {
         self.source.error(
             value.span().start,
-            format!("{} of {} is {expected}", key, excerpt(self.name)),
+            format!(
+                "{key} of {} is something else; write {expected}",
+                excerpt(self.name)
+            ),
         )
     }
 }

@@ -45,11 +45,18 @@ impl Equations {
     pub fn parse(text: &str) -> Result<Self, EquationsError> {
         let source = SourceText(text);
         if text.len() > MOST {
-            return source.error(0, format!("more than {} MiB of text", MOST >> 20));
+            return source.error(
+                0,
+                format!(
+                    "more than {} MiB of text; a twin of that size needs Rust",
+                    MOST >> 20
+                ),
+            );
         }
         let file = DeTable::parse(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start);
-            EquationsError::at(text, start, message(error.message()))
+            let problem = format!("{}; correct the TOML there", message(error.message()));
+            EquationsError::at(text, start, problem)
         })?;
         let file = file.get_ref();
         for key in file.keys() {
@@ -240,7 +247,7 @@ impl Reader<'_> {
         }
         self.motion = Some(key);
         let Some(motion) = entry.expression(keys, key)? else {
-            return entry.error(format!("{name} has no {key}"));
+            return entry.error(format!("{name} has no {key}; give it"));
         };
         self.outline.states.push(quantity(entry, keys)?);
         Ok(StateText {
@@ -256,7 +263,8 @@ impl Reader<'_> {
         entry: &TableEntry<'_, '_>,
         keys: &DeTable<'_>,
     ) -> Result<[Id; 2], EquationsError> {
-        const OF: &str = "limits can name parameters, constants and definitions of these";
+        const OF: &str =
+            "limits change with time; name parameters, constants and definitions of these alone";
         let graph = &mut self.names.graph;
         let Some(value) = keys.get("limits") else {
             return Ok([graph.number(f64::NEG_INFINITY), graph.number(f64::INFINITY)]);

@@ -160,7 +160,7 @@ impl<'t> Scope<'t> {
             EquationsError::at(
                 self.source.0,
                 placed.byte(0),
-                "an expression without operands",
+                "an expression without operands; write 0",
             )
         };
         for item in &placed.expression.0 {
@@ -226,7 +226,9 @@ impl<'t> Scope<'t> {
             Some((Meaning::State(index), _)) => Node::State(*index),
             Some((Meaning::Input(index), _)) => Node::Input(*index),
             Some((Meaning::Defined(index), _)) => {
-                return self.defined[*index].ok_or_else(|| format!("{name} is not known here"));
+                return self.defined[*index].ok_or_else(|| {
+                    format!("{name} is not known here; use constants and parameters")
+                });
             }
             Some((Meaning::Output, _)) => {
                 return Err(format!(

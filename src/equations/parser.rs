@@ -244,7 +244,7 @@ impl<'t> Parser<'t> {
                 usize::MAX => format!("{least} or more"),
                 _ => least.to_string(),
             };
-            return Err((at, format!("{name} has {given} numbers, it takes {needed}")));
+            return Err((at, format!("{name} has {given} numbers; it takes {needed}")));
         }
         match function {
             Callable::One(operation) => self.items.push(Item::One(operation)),
@@ -258,12 +258,14 @@ impl<'t> Parser<'t> {
 
 fn unexpected(token: Token<'_>, expected: &str) -> String {
     let found = match token {
-        Token::End => "the expression ends".to_owned(),
+        Token::End => {
+            return format!("the expression ends where {expected} is expected; write one behind it");
+        }
         Token::Number(number) => format!("unexpected {number}"),
         Token::Name(word) => format!("unexpected \"{word}\""),
         Token::Sign(sign) => format!("unexpected \"{sign}\""),
     };
-    format!("{found} where {expected} is expected")
+    format!("{found} where {expected} is expected; write one before it")
 }
 
 #[cfg(test)]
@@ -328,7 +330,7 @@ mod tests {
             ("(1 + 2", 6, "an operation or )"),
             ("1 2", 2, "unexpected 2"),
             ("sine(1)", 0, "did you mean \"sin\"?"),
-            ("1 + atan2(1)", 4, "atan2 has 1 numbers, it takes 2"),
+            ("1 + atan2(1)", 4, "atan2 has 1 numbers; it takes 2"),
             ("min(1)", 0, "2 or more"),
             ("sin + 1", 0, "write sin("),
             ("1 < 2 < 3", 6, "second comparison"),

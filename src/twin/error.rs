@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum TwinError {
     /// An interval whose ends are exchanged, equal or NaN.
-    #[error("invalid interval [{}, {}]: low must be below high", number(*low), number(*high))]
+    #[error("invalid interval [{}, {}]; low must be below high", number(*low), number(*high))]
     Interval {
         /// Lower end.
         low: f64,
