@@ -31,6 +31,7 @@ impl StateSpace for Silverbox {
             states: vec![Quantity::new("x", "V"), Quantity::new("v", "V/s")],
             inputs: vec![Quantity::new("u", "V")],
             outputs: vec![Quantity::new("y", "V")],
+            ..Outline::new()
         }
     }
     fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
@@ -52,6 +53,7 @@ impl StateSpace for Silverbox {
         Stepping {
             substeps: 2,
             hold: Hold::Nearest,
+            ..Stepping::default()
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::twin::{Integrator, MOST_SUBSTEPS, Stepping, Twin};
 use nalgebra::DVector;
 
 /// A finer step than a twin's own, or another rule for inputs between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::diagnose) struct OtherStep {
     pub integrator: Integrator,
     pub stepping: Stepping,
@@ -22,7 +22,7 @@ impl OtherStep {
     /// Finer steps from the cheapest to the last, which stands for an exact one. A Runge–Kutta step takes four rates, and is given the time
     /// of four of Euler's; limits of states act once a substep, so that only more of them help a state that runs into its limits.
     fn candidates(integrator: Integrator, stepping: Stepping) -> Vec<Self> {
-        use Integrator::{Discrete, Euler, RungeKutta4};
+        use Integrator::{Adaptive, Discrete, Euler, RungeKutta4, Stiff};
         let own = stepping.substeps;
         let all = match integrator {
             Euler => vec![
@@ -31,7 +31,8 @@ impl OtherStep {
                 (Euler, 16 * own),
                 (RungeKutta4, own.max(16)),
             ],
-            Discrete => vec![],
+            // Steps to a tolerance are as fine as they need be.
+            Discrete | Adaptive | Stiff => vec![],
             rule => vec![(rule, 2 * own), (rule, 4 * own), (rule, 16 * own)],
         };
         (all.into_iter())

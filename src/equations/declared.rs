@@ -16,6 +16,8 @@ pub(crate) struct Declared {
     pub factors: BTreeMap<String, f64>,
     /// States whose start is looked for around a mean.
     pub estimated: BTreeSet<String>,
+    /// Time that starts belong to, before the first row.
+    pub begins: Option<f64>,
 }
 
 /// The noise of a state or an output.
@@ -111,7 +113,7 @@ impl Declared {
         }
     }
 
-    /// Reads `start`: a value of parameters, a mean with a deviation; a mean alone or nothing where it is unknown.
+    /// Reads `start`: a value of parameters, also at an earlier time; a mean with a deviation; a mean alone or nothing where it is unknown.
     pub(super) fn start(
         &mut self,
         entry: &TableEntry<'_, '_>,
@@ -142,12 +144,14 @@ impl Declared {
             ..*entry
         };
         let keys = table.keys(&["mean", "std", "value", "at"])?;
-        if let Some(at) = keys.get("at") {
-            return table.wrong(
-                "at",
-                at,
-                "not known to this version; a start belongs to the first row",
-            );
+        if let Some(value) = keys.get("at") {
+            let Some(at) = super::place::number(value.get_ref()).filter(|at| at.is_finite()) else {
+                return table.wrong("at", value, "a time in seconds");
+            };
+            if self.begins.is_some_and(|other| other != at) {
+                return table.error("states start at two times; give all the same at");
+            }
+            self.begins = Some(at);
         }
         let key = if keys.contains_key("value") {
             "value"

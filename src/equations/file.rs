@@ -12,7 +12,11 @@ use super::twin::Equations;
 use crate::record::Quantity;
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, message};
-use crate::twin::{Hold, Integrator, Interval, Outline, Parameter, Stepping};
+use crate::twin::{
+    Hold, Integrator, Interval, MOST_SUBSTEPS, Outline, Parameter, Stepping, TOLERANCES,
+};
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -160,7 +164,7 @@ fn read(source: SourceText<'_>, file: &DeTable<'_>) -> Result<Equations, Equatio
         (states.iter().map(|entry| reader.state(entry))).collect::<Result<_, _>>()?;
     let outputs: Vec<(Id, NoiseValue)> =
         (outputs.iter().map(|entry| reader.output(entry))).collect::<Result<_, _>>()?;
-    let (integrator, substeps) = integrator(source, file, reader.motion == Some("next"))?;
+    let (integrator, stepping) = integrator(source, file, reader.motion == Some("next"))?;
     let name = name(source, file)?;
     let graph = &reader.names.graph;
     let tapes = tapes(graph, &states, &outputs);
@@ -169,7 +173,7 @@ fn read(source: SourceText<'_>, file: &DeTable<'_>) -> Result<Equations, Equatio
         outline: reader.outline,
         tapes,
         integrator,
-        stepping: Stepping { substeps, hold },
+        stepping: Stepping { hold, ..stepping },
     };
     Ok(Equations {
         name,
@@ -202,7 +206,7 @@ impl Reader<'_> {
 
     /// Reads inputs and what they are between samples.
     fn inputs(&mut self, inputs: &[TableEntry<'_, '_>]) -> Result<Hold, EquationsError> {
-        let mut hold: Option<Hold> = None;
+        let mut holds = BTreeMap::new();
         for entry in inputs {
             let keys = entry.keys(&["unit", "hold", "words"])?;
             self.outline.inputs.push(quantity(entry, keys)?);
@@ -212,17 +216,26 @@ impl Reader<'_> {
                     Some("zero") => Hold::Zero,
                     Some("linear") => Hold::Linear,
                     Some("nearest") => Hold::Nearest,
-                    _ => return entry.wrong("hold", value, "\"zero\", \"linear\" or \"nearest\""),
+                    Some("impulse") => Hold::Impulse,
+                    _ => {
+                        let all = "\"zero\", \"linear\", \"nearest\" or \"impulse\"";
+                        return entry.wrong("hold", value, all);
+                    }
                 },
             };
-            if hold.is_some_and(|other| other != own) {
-                return entry.error(
-                    "another hold than that of the inputs before; this version has one for all",
-                );
-            }
-            hold = Some(own);
+            holds.insert(entry.name.to_owned(), own);
         }
-        Ok(hold.unwrap_or_default())
+        // A rule that all inputs have is asked of records; several are as they are declared.
+        let doses = |hold: &Hold| *hold == Hold::Impulse;
+        let mut others = holds.values().copied().filter(|hold| !doses(hold));
+        let usual = others.next().unwrap_or_default();
+        if others.any(|hold| hold != usual) {
+            self.outline.held = holds;
+            return Ok(Hold::Zero);
+        }
+        holds.retain(|_, hold| doses(hold));
+        self.outline.held = holds;
+        Ok(usual)
     }
 
     fn state(&mut self, entry: &TableEntry<'_, '_>) -> Result<StateText, EquationsError> {
@@ -379,12 +392,12 @@ fn name(source: SourceText<'_>, file: &DeTable<'_>) -> Result<String, EquationsE
     })
 }
 
-/// Reads the integrator and the number of its steps within a sample.
+/// Reads the integrator, the number of its steps within a sample and the tolerance of adaptive ones.
 fn integrator(
     source: SourceText<'_>,
     file: &DeTable<'_>,
     is_discrete: bool,
-) -> Result<(Integrator, usize), EquationsError> {
+) -> Result<(Integrator, Stepping), EquationsError> {
     let record = file
         .get(RECORD)
         .and_then(|value| value.get_ref().as_table());
@@ -394,10 +407,12 @@ fn integrator(
         Some("euler") => Some(Integrator::Euler),
         Some("runge-kutta-4") => Some(Integrator::RungeKutta4),
         Some("discrete") => Some(Integrator::Discrete),
+        Some("adaptive") => Some(Integrator::Adaptive),
+        Some("stiff") => Some(Integrator::Stiff),
         Some(other) => {
             let byte = value.map_or(0, |value| value.span().start);
             let problem = format!(
-                "unknown integrator \"{}\"; there are euler, runge-kutta-4 and discrete",
+                "unknown integrator \"{}\"; there are adaptive, stiff, discrete, euler and runge-kutta-4",
                 excerpt(other)
             );
             return source.error(byte, problem);
@@ -416,12 +431,21 @@ fn integrator(
             return source.error(byte, "discrete is for states that have next, and these have a rate; choose another integrator");
         }
         (Some(other), false) => other,
-        (None, false) => Integrator::RungeKutta4,
+        (None, false) => Integrator::Adaptive,
     };
-    // What a study says of substeps, the study checks.
-    let substeps = record.and_then(|record| number(record.get("substeps")?.get_ref()));
-    let substeps = substeps.filter(|n| (1.0..=crate::twin::MOST_SUBSTEPS as f64).contains(n));
-    Ok((integrator, substeps.map_or(1, |n| n as usize)))
+    // What a study says of substeps and the tolerance, the study checks.
+    let given = |key, range: RangeInclusive<f64>| {
+        let value = record.and_then(|record| number(record.get(key)?.get_ref()));
+        value.filter(|value| range.contains(value))
+    };
+    let mut stepping = Stepping::default();
+    if let Some(substeps) = given("substeps", 1.0..=MOST_SUBSTEPS as f64) {
+        stepping.substeps = substeps as usize;
+    }
+    if let Some(tolerance) = given("tolerance", TOLERANCES) {
+        stepping.tolerance = tolerance;
+    }
+    Ok((integrator, stepping))
 }
 
 /// Returns the tables of a twin as a file has them, without comments.

@@ -259,7 +259,9 @@ impl<'t> Parser<'t> {
 fn unexpected(token: Token<'_>, expected: &str) -> String {
     let found = match token {
         Token::End => {
-            return format!("the expression ends where {expected} is expected; write one behind it");
+            return format!(
+                "the expression ends where {expected} is expected; write one behind it"
+            );
         }
         Token::Number(number) => format!("unexpected {number}"),
         Token::Name(word) => format!("unexpected \"{word}\""),

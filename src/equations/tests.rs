@@ -170,15 +170,15 @@ fn faults_are_one_line_with_their_place() {
             "rate of h is something else; write a number or an expression",
         ),
         (
-            "[states]\nh = { rate = \"1\" }\n[record]\nintegrator = \"stiff\"\n",
-            "there are euler, runge-kutta-4 and discrete",
+            "[states]\nh = { rate = \"1\" }\n[record]\nintegrator = \"stif\"\n",
+            "there are adaptive, stiff, discrete, euler and runge-kutta-4",
         ),
         (
             "[states]\nh = { rate = \"1\" }\n[event]\n",
             "\"event\" is no table of a twin",
         ),
         (
-            "[states]\nh = { rate = \"1\" }\n[inputs]\nu = { hold = \"impulse\" }\n",
+            "[states]\nh = { rate = \"1\" }\n[inputs]\nu = { hold = \"pulse\" }\n",
             "hold of u is something else",
         ),
         (
@@ -245,6 +245,37 @@ fn next_is_the_value_at_the_next_sample() {
         problem(&format!("{text}[record]\nintegrator = \"euler\"\n"))
             .contains("leave out the integrator")
     );
+}
+
+/// A cup that cools from a known temperature, first measured after 3 s; a dose and a wind that moves on a line, each by its own rule.
+#[test]
+fn starts_have_times_and_inputs_rules() {
+    let text = "[parameters]\nk = { prior = [0.1, 1.0] }\n\
+        [states]\nT = { rate = \"-k*T + heat\", start = { value = 80.0, at = 2.0 } }\nw = { rate = \"wind\", start = 0.0 }\n\
+        [inputs]\nheat = { hold = \"impulse\" }\nwind = { hold = \"linear\" }\n\
+        [outputs]\ny = { value = \"T\" }\nz = { value = \"w\" }\n";
+    let twin = Equations::parse(text).unwrap();
+    let inputs = Signal::from_shape_fn((4, 2), |(k, input)| match input {
+        0 => [0.0, 10.0, 0.0, 0.0][k],
+        _ => k as f64,
+    });
+    let drive = Drive::new(0.5, inputs).unwrap().beginning_at(5.0);
+    let y = twin.simulate(&[0.4], &drive, Noise::OFF).unwrap();
+    let mut expected = 80.0 * (-1.2f64).exp();
+    for k in 0..4 {
+        assert!(
+            (y[(k, 0)] - expected).abs() < 1e-5,
+            "{k}: {} {expected}",
+            y[(k, 0)]
+        );
+        // The dose of row 1 shows in row 2.
+        let dose = if k == 1 { 10.0 } else { 0.0 };
+        expected = (expected + dose) * (-0.2f64).exp();
+        let way = 0.25 * (k * k) as f64;
+        assert!((y[(k, 1)] - way).abs() < 1e-9, "{k}: {}", y[(k, 1)]);
+    }
+    let two = text.replace("start = 0.0", "start = { value = 0.0, at = 1.0 }");
+    assert!(problem(&two).contains("two times"));
 }
 
 /// Random changes of good texts: read or refused in a line, and what is read computes without a panic.

@@ -53,6 +53,19 @@ impl Equations {
         &self.text
     }
 
+    fn composed(&self) -> Composed {
+        let program = self.program.clone();
+        // Constraints act on one state after the other.
+        let all = match program.tapes.ends {
+            Some(_) => Composed::new(program),
+            None => Composed::in_blocks(program),
+        };
+        match self.declared.begins {
+            Some(at) => all.beginning(at),
+            None => all,
+        }
+    }
+
     /// Declarations of noise and starts.
     pub(crate) fn declared(&self) -> &Declared {
         &self.declared
@@ -74,19 +87,17 @@ impl DigitalTwin for Equations {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        self.program.simulate(theta, drive, noise)
+        match self.declared.begins {
+            Some(_) => self.composed().run(theta, drive, noise),
+            None => self.program.simulate(theta, drive, noise),
+        }
     }
 
     fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
-        self.program.free_run(theta, drive)
+        self.simulate(theta, drive, Noise::OFF)
     }
 
     fn equations(self: Arc<Self>) -> Option<Composed> {
-        let program = self.program.clone();
-        // Constraints act on one state after the other.
-        Some(match program.tapes.ends {
-            Some(_) => Composed::new(program),
-            None => Composed::in_blocks(program),
-        })
+        Some(self.composed())
     }
 }

@@ -206,6 +206,7 @@ mod testing {
                 states: vec![Quantity::new("x", "m")],
                 inputs: vec![Quantity::new("u", "m/s"); self.0],
                 outputs: vec![Quantity::new("y", "m")],
+                ..Outline::new()
             }
         }
         fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {

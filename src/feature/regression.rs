@@ -192,6 +192,7 @@ mod tests {
                     states: named(["x1", "x2"]),
                     inputs: named(["u1", "u2"]),
                     outputs: named(["y1", "y2"]),
+                    ..Outline::new()
                 }
             }
             fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {

@@ -129,16 +129,19 @@ impl Warning {
             Hold::Zero => "are held at the last sample (hold = \"zero\")",
             Hold::Linear => "move on a line (hold = \"linear\")",
             Hold::Nearest => "are held at the nearest sample (hold = \"nearest\")",
+            Hold::Impulse => "are amounts that are added at samples (hold = \"impulse\")",
         };
-        let substeps = stepping.substeps;
+        let substeps = match stepping.substeps {
+            1 => String::new(),
+            substeps => format!(", with {substeps} substeps"),
+        };
         let gain = gain.map_or(String::new(), |gain| {
             format!(
                 ", which explains the records better by {} nats",
                 number(three_digits(gain))
             )
         });
-        let what =
-            format!("between samples, inputs {rule}{gain}; this is used, with {substeps} substeps");
+        let what = format!("between samples, inputs {rule}{gain}; this is used{substeps}");
         Self::new("inputs-between-samples", what)
     }
 

@@ -8,7 +8,7 @@ use crate::likelihood::Level;
 use crate::likelihood::kalman::{FilterError, States, recoverable};
 use crate::math::deviation;
 use crate::record::Signal;
-use crate::twin::begun;
+use crate::twin::{StepsTaken, begun};
 
 /// States at the first sample of each record, given the whole record.
 pub(crate) fn starts(problem: &Problem, smoothed: &[States]) -> Vec<FittedStart> {
@@ -55,6 +55,17 @@ pub(crate) fn free_runs(
             }
         })
         .collect()
+}
+
+/// Adaptive substeps of all records; `None` for fixed ones, and where a run diverges.
+pub(super) fn steps_taken(problem: &Problem, theta: &[f64]) -> Option<StepsTaken> {
+    let equations = problem.twin.equations()?;
+    let mut records = problem.records.iter().enumerate();
+    records.try_fold(StepsTaken::default(), |all, (r, record)| {
+        let own = problem.of_record(r, theta);
+        let taken = equations.steps_taken(&own, record.drive()).ok()?;
+        Some(all.and(taken?))
+    })
 }
 
 /// Errors of each output that the records have at the full θ.

@@ -63,11 +63,16 @@ pub(crate) fn other_hold(
     }
     let factor = match integrator {
         Integrator::Euler => FINE * FINE,
+        Integrator::Adaptive | Integrator::Stiff => 1,
         _ => FINE,
     };
     let substeps = (factor * own.substeps).min(MOST_SUBSTEPS);
     let carried = |hold: Hold| -> Result<Option<f64>, FilterError> {
-        let Some(finer) = problem.stepped(Stepping { substeps, hold }) else {
+        let Some(finer) = problem.stepped(Stepping {
+            substeps,
+            hold,
+            ..own
+        }) else {
             return Ok(None);
         };
         Ok(climb(&finer, theta, ITERATIONS)?.map(|fitted| fitted.objective))
@@ -77,7 +82,11 @@ pub(crate) fn other_hold(
     for hold in shown {
         let gain = carried(hold)?.map_or(f64::NEG_INFINITY, |objective| objective - least);
         if gain > best.map_or(WINS, |best| best.gain) {
-            let stepping = Stepping { substeps, hold };
+            let stepping = Stepping {
+                substeps,
+                hold,
+                ..own
+            };
             best = Some(OtherHold { stepping, gain });
         }
     }
@@ -133,6 +142,7 @@ mod tests {
         let stepping = Stepping {
             substeps: 16,
             hold: made_with,
+            ..Stepping::default()
         };
         let world = (Twin::new(Room).stepped(|_, own| *own = stepping)).unwrap();
         let outputs = world.simulate(&[2.0, 3.0], &drive, Noise::new(seed, "held", 0));

@@ -4,7 +4,7 @@ use super::certificate::Side;
 use super::posterior::{Posterior, PosteriorRegion};
 use super::profile::Profile;
 use crate::record::Signal;
-use crate::twin::{Noise, Role, Stepping};
+use crate::twin::{Noise, Role, Stepping, StepsTaken};
 use serde::Serialize;
 
 /// Settings of a fit.
@@ -68,6 +68,9 @@ pub struct Fit {
     /// Substeps, and the rule for inputs between samples, that the fit used in place of the twin's, as the records ask for; none otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stepping: Option<Stepping>,
+    /// Adaptive substeps of free runs from the twin's own start, over all records; none for fixed steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steps: Option<StepsTaken>,
     /// Number of samples of all records.
     pub samples: usize,
     /// Wall time in seconds.

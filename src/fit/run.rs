@@ -4,7 +4,7 @@ use super::certificate::{Certificate, restarted};
 use super::climb::{Fitted, climb};
 use super::doubts::Doubts;
 use super::evidence::evidence;
-use super::follow::{errors, free_runs, starts, swallowed};
+use super::follow::{errors, free_runs, starts, steps_taken, swallowed};
 use super::outcome::{Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue};
 use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
 use super::problem::Problem;
@@ -113,6 +113,7 @@ pub(crate) fn run(
             .transpose()?,
         profiles,
         stepping: None,
+        steps: steps_taken(&problem, &fitted.theta),
         samples: problem.samples(),
         seconds: clock.elapsed().as_secs_f64(),
         residuals: (problem.filtered(&fitted.theta)?.into_iter())

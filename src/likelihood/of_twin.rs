@@ -124,6 +124,7 @@ impl Likelihood for EnsembleLikelihood {
             states: signals.outputs.clone(),
             inputs: signals.inputs,
             outputs: signals.outputs,
+            ..Outline::new()
         }
     }
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError> {

@@ -27,6 +27,7 @@ use serde_json::{Value, json};
 /// | `errors` | of each output: root mean square of one-step and free-run errors, deviation of the record; `correlation` of one-step errors with the row before |
 /// | `warnings` | `code`, `what`, `remedy` |
 /// | `posterior` | of posterior draws: names, how many independent ones they are worth, share and mean of each mode; null where none were asked for |
+/// | `steps` | of a twin with adaptive steps: samples, substeps, most of one sample, samples with implicit steps |
 /// | `samples`, `seconds` | size of the records, time that it took |
 pub(super) fn fit_json(study: &Study, fit: &Fit) -> Value {
     let mut value = json!({ "schema": "truetwin.fit/1", "twin": study.name() });
@@ -272,8 +273,11 @@ fn quality(fit: &Fit) -> Vec<Block> {
             .map_or(String::new(), |e| format!(" ± {}", short(e)));
         search += &format!(" Log evidence {:.2}{error} nats.", evidence.log_evidence);
     }
+    let steps = (fit.steps).map_or(String::new(), |taken| {
+        format!(" The twin took {}.", taken.text())
+    });
     all.push(Block::Paragraph(format!(
-        "{search} {} s.",
+        "{search}{steps} {} s.",
         short(fit.seconds)
     )));
     all

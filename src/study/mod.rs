@@ -22,10 +22,10 @@ pub(crate) use tables::{Library, RecordTable};
 
 use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment};
 use crate::record::{Drive, Record, RecordError};
-use crate::setting::did_you_mean;
+use crate::setting::{did_you_mean, number};
 use crate::twin::{
-    Adaptation, DigitalTwin, Integrator, MOST_SUBSTEPS, Noise, NoiseLevel, Role, Stepping, Twin,
-    TwinError, adapt, check_twin, fix,
+    Adaptation, DigitalTwin, Hold, Integrator, MOST_SUBSTEPS, Noise, NoiseLevel, Role, Stepping,
+    TOLERANCES, Twin, TwinError, adapt, check_twin, fix,
 };
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -316,16 +316,39 @@ impl Study {
 
     /// Returns the twin as registered, with the integrator, the substeps and the hold of a file.
     fn stepped(&self, record: &RecordTable) -> Result<Twin, StudyError> {
-        let (integrator, substeps, hold) = (record.integrator, record.substeps, record.hold);
-        let key = match (substeps, integrator, hold) {
-            (Some(_), ..) => "substeps",
-            (_, Some(_), _) => "integrator",
-            (.., Some(_)) => "hold",
-            _ => return Ok(self.base.clone()),
+        let RecordTable {
+            integrator,
+            substeps,
+            hold,
+            tolerance,
+            ..
+        } = *record;
+        let given = [
+            (substeps.is_some(), "substeps"),
+            (integrator.is_some(), "integrator"),
+            (hold.is_some(), "hold"),
+            (tolerance.is_some(), "tolerance"),
+        ];
+        let Some((_, key)) = given.into_iter().find(|(is_given, _)| *is_given) else {
+            return Ok(self.base.clone());
         };
         if let Some(n) = substeps.filter(|n| !(1..=MOST_SUBSTEPS).contains(n)) {
             return Err(StudyError::Plan(format!(
                 "substeps = {n}; choose between 1 and {MOST_SUBSTEPS}"
+            )));
+        }
+        if hold == Some(Hold::Impulse) {
+            return Err(StudyError::Plan(
+                "hold = \"impulse\" is of a single input; say so where the input is declared"
+                    .into(),
+            ));
+        }
+        if let Some(tolerance) = tolerance.filter(|share| !TOLERANCES.contains(share)) {
+            return Err(StudyError::Plan(format!(
+                "tolerance = {}; choose a share between {:e} and {}",
+                number(tolerance),
+                TOLERANCES.start(),
+                TOLERANCES.end()
             )));
         }
         let is_discrete = |rule: Integrator| rule == Integrator::Discrete;
@@ -334,7 +357,7 @@ impl Study {
                 Some(rule) => is_discrete(rule) != is_discrete(own),
                 None => is_discrete(own),
             };
-            if wrong || is_discrete(own) && (substeps, hold) != (None, None) {
+            if wrong || is_discrete(own) && (substeps, hold, tolerance) != (None, None, None) {
                 return Err(StudyError::Plan(format!(
                     "{key}: {}",
                     match is_discrete(own) {
@@ -350,6 +373,7 @@ impl Study {
             *rule = integrator.unwrap_or(*rule);
             stepping.hold = hold.unwrap_or(stepping.hold);
             stepping.substeps = substeps.unwrap_or(stepping.substeps);
+            stepping.tolerance = tolerance.unwrap_or(stepping.tolerance);
         };
         self.base.stepped(change).ok_or_else(|| {
             StudyError::Plan(format!(

@@ -25,6 +25,8 @@ pub struct RecordTable {
     pub integrator: Option<Integrator>,
     /// Steps of the integrator within a sample, also of measured records.
     pub substeps: Option<usize>,
+    /// Largest error of an adaptive substep, as a share of a state's largest size; also of measured records.
+    pub tolerance: Option<f64>,
     /// Columns of measured records that do not have the usual names.
     #[serde(skip_serializing_if = "Columns::is_empty")]
     pub columns: Columns,

@@ -2,8 +2,9 @@
 
 use crate::record::{Quantity, Signals};
 use crate::twin::{
-    Integrator, Interval, Now, Parameter, ParameterSpace, SimulationError, Stepping,
+    Hold, Integrator, Interval, Now, Parameter, ParameterSpace, SimulationError, Stepping,
 };
+use std::collections::BTreeMap;
 
 /// A twin given by its equations
 ///
@@ -140,6 +141,8 @@ pub struct Outline {
     pub inputs: Vec<Quantity>,
     /// Outputs, in the order of y.
     pub outputs: Vec<Quantity>,
+    /// What inputs are between samples, by name; the others are as [`stepping`](StateSpace::stepping) says.
+    pub held: BTreeMap<String, Hold>,
 }
 
 impl Outline {
@@ -169,6 +172,13 @@ impl Outline {
         self
     }
 
+    /// Says what an input is between samples, whatever the other inputs are.
+    #[must_use]
+    pub fn hold(mut self, input: &str, hold: Hold) -> Self {
+        self.held.insert(input.into(), hold);
+        self
+    }
+
     /// Adds an output.
     #[must_use]
     pub fn output(mut self, name: &str, unit: &str) -> Self {
@@ -186,6 +196,12 @@ impl Outline {
             }
         }
         self
+    }
+
+    /// What each input is between samples; `usual` without a word of its own.
+    pub(crate) fn holds(&self, usual: Hold) -> Vec<Hold> {
+        let held = |input: &Quantity| self.held.get(&input.name).copied().unwrap_or(usual);
+        self.inputs.iter().map(held).collect()
     }
 
     /// Input and output channels.

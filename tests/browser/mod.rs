@@ -84,6 +84,7 @@ impl StateSpace for Rig {
             ]),
             inputs: quantities(&[("feed", "kg/s"), ("bypass", "-")]),
             outputs: quantities(&[("temperature_of_the_condenser", "K"), ("y2", "-")]),
+            ..Outline::new()
         }
     }
     fn drift(&self, _: &Now<'_>, _: &[f64], rates: &mut [f64]) {

@@ -94,6 +94,12 @@ enum Template {
     Sir,
     /// A heat exchanger with two inputs and two outputs.
     HeatExchanger,
+    /// A drug in two compartments: doses.
+    Pharmacokinetics,
+    /// A house of two capacities: a heater that is switched, weather that is sampled.
+    House,
+    /// Hares and lynxes: an oscillation of two states, both measured.
+    PredatorPrey,
 }
 
 impl Template {
@@ -104,6 +110,9 @@ impl Template {
             Self::DcMotor => include_str!("../../../examples/dc-motor.toml"),
             Self::Sir => include_str!("../../../examples/sir.toml"),
             Self::HeatExchanger => include_str!("../../../examples/heat-exchanger.toml"),
+            Self::Pharmacokinetics => include_str!("../../../examples/pharmacokinetics.toml"),
+            Self::House => include_str!("../../../examples/house.toml"),
+            Self::PredatorPrey => include_str!("../../../examples/predator-prey.toml"),
         }
     }
 }

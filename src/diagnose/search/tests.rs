@@ -205,6 +205,7 @@ const FINER: OtherStep = OtherStep {
     stepping: Stepping {
         substeps: 4,
         hold: Hold::Zero,
+        tolerance: 1e-7,
     },
 };
 

@@ -211,6 +211,7 @@ mod tests {
                 states: vec![Quantity::new("x", "m")],
                 inputs: vec![Quantity::new("u", "m/s")],
                 outputs: vec![Quantity::new("y", "m")],
+                ..Outline::new()
             }
         }
         fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {

@@ -42,6 +42,7 @@ impl StateSpace for Chain {
             states: vec![Quantity::new("x", "m"), Quantity::new("v", "m/s")],
             inputs: vec![Quantity::new("u", "m/s²")],
             outputs: outputs.collect(),
+            ..Outline::new()
         }
     }
     fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {

@@ -398,11 +398,13 @@ pub(super) fn other_step(diagnosis: &Diagnosis) -> Option<[String; 2]> {
         wrong.push("the twin's own step is too long for this record");
     }
     if let Some(hold) = diagnosis.hold {
-        settings.push(match hold {
-            Hold::Zero => "hold \"zero\"".to_owned(),
-            Hold::Linear => "hold \"linear\"".to_owned(),
-            Hold::Nearest => "hold \"nearest\"".to_owned(),
-        });
+        let rule = match hold {
+            Hold::Zero => "zero",
+            Hold::Linear => "linear",
+            Hold::Nearest => "nearest",
+            Hold::Impulse => "impulse",
+        };
+        settings.push(format!("hold \"{rule}\""));
         wrong.push("its inputs move otherwise between samples");
     }
     (!settings.is_empty()).then(|| [settings.join(" with "), wrong.join(", and ")])

@@ -54,6 +54,7 @@ impl From<Arc<dyn DigitalTwin>> for ComposedBlackBox {
             states: vec![],
             inputs: signals.inputs,
             outputs: signals.outputs,
+            ..Outline::new()
         };
         let parts = Parts::none(
             outline,

@@ -176,8 +176,8 @@ impl<T: StateSpace> Engine for T {
         readout_lanes(now, y, |now, y| self.readout_points(now, 1, y))
     }
 
-    fn run(&self, setup: RunSetup<'_>, noise: Noise) -> Result<Signal, SimulationError> {
-        simulate(&Alone(self), setup, noise)
+    fn run(&self, mut setup: RunSetup<'_>, noise: Noise) -> Result<Signal, SimulationError> {
+        simulate(&Alone(self), &mut setup, noise)
     }
 }
 
@@ -219,14 +219,18 @@ fn run_alone<T: StateSpace>(
     check_lengths(&outline, theta, drive)?;
     twin.check_parameters(theta, drive.dt())?;
     let (limits, stepping) = (twin.limits(), twin.stepping());
-    let setup = RunSetup {
+    let mut setup = RunSetup {
         outline: &outline,
         limits: felt(&limits),
-        acting: Acting::plain(theta, drive, stepping.hold),
+        acting: Acting::plain(theta, drive, outline.holds(stepping.hold)),
         dead_time: DeadTime::NONE,
-        work: Workspace::of(outline.inputs.len(), &limits, (twin.integrator(), stepping)),
+        work: Workspace::of(
+            &outline.holds(stepping.hold),
+            &limits,
+            (twin.integrator(), stepping),
+        ),
     };
-    simulate(&Alone(twin), setup, noise)
+    simulate(&Alone(twin), &mut setup, noise)
 }
 
 /// One step of one state without noise and limits: memories, then motion.

@@ -36,8 +36,8 @@ pub(crate) use simulation::{Acting, DeadTime, check_start};
 use crate::record::{Drive, Signal};
 use crate::twin::integrator::felt;
 use crate::twin::{
-    Blocks, Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
-    Stepping, Workspace,
+    Blocks, Hold, Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
+    Stepping, StepsTaken, Workspace,
 };
 use own::OwnEquations;
 pub(in crate::twin) use parts::Parts;
@@ -144,14 +144,24 @@ impl Composed {
         Self { own, parts }
     }
 
+    /// Returns the same equations, whose starts belong to this time of a record's clock.
+    pub(crate) fn beginning(&self, at: f64) -> Self {
+        self.of(self.parts.with([], vec![TwinPart::Begins(Some(at))]))
+    }
+
     pub(in crate::twin) fn parts(&self) -> &Parts {
         &self.parts
+    }
+
+    /// Returns what each input is between samples.
+    pub(crate) fn holds(&self) -> Vec<Hold> {
+        self.parts.outline.holds(self.stepping().hold)
     }
 
     /// Returns buffers for its motion.
     pub(crate) fn workspace(&self) -> Workspace {
         let rule = (self.integrator(), self.stepping());
-        Workspace::of(self.parts.outline.inputs.len(), self.limits(), rule)
+        Workspace::of(&self.holds(), self.limits(), rule)
     }
 
     /// Returns all of θ from the free entries.
@@ -243,10 +253,29 @@ impl Composed {
             setup.acting.first_entries(self.parts.parameters);
             self.own.run(setup, noise)?
         } else {
-            simulate(self, setup, noise)?
+            simulate(self, &mut setup, noise)?
         };
         self.finish(theta, noise, &mut outputs);
         Ok(outputs)
+    }
+
+    /// Returns the adaptive substeps of a run without noise at θ; `None` for fixed steps.
+    pub(crate) fn steps_taken(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<StepsTaken>, SimulationError> {
+        let mut setup = RunSetup {
+            outline: &self.parts.outline,
+            limits: felt(self.limits()),
+            acting: Acting::of(self, theta, drive)?,
+            dead_time: DeadTime::NONE,
+            work: self.workspace(),
+        };
+        if setup.work.steps_taken().is_some() {
+            simulate(self, &mut setup, Noise::OFF)?;
+        }
+        Ok(setup.work.steps_taken())
     }
 
     /// Returns the steps to which finished outputs are rounded, by output, 0 for none; empty without any. A filter takes an output for all

@@ -81,7 +81,10 @@ impl LeadIn {
 /// A drive as the equations of a twin see it at θ.
 pub(crate) struct Acting<'d> {
     drive: Cow<'d, Drive>,
-    hold: Hold,
+    /// What each input is between samples; empty where all are held.
+    holds: Vec<Hold>,
+    /// Inputs before the first row, which no amount is added at.
+    inputs_before: Vec<f64>,
     /// All of θ, held entries too.
     theta: Theta,
     before: LeadIn,
@@ -102,17 +105,19 @@ impl<'d> Acting<'d> {
         let begun = twin.begins().unwrap_or(drive.first_time());
         Ok(Self {
             before: LeadIn::of(&drive, begun).map_err(SimulationError::fatal)?,
+            inputs_before: without_amounts(drive.input(0), &twin.holds()),
             drive,
-            hold: twin.stepping().hold,
+            holds: between(twin.holds()),
             theta: twin.complete(theta),
         })
     }
 
     /// The drive as it is recorded.
-    pub(super) fn plain(theta: &[f64], drive: &'d Drive, hold: Hold) -> Self {
+    pub(super) fn plain(theta: &[f64], drive: &'d Drive, holds: Vec<Hold>) -> Self {
         Self {
             drive: Cow::Borrowed(drive),
-            hold,
+            holds: between(holds),
+            inputs_before: vec![],
             theta: Theta::from_slice(theta),
             before: LeadIn {
                 begun: drive.first_time(),
@@ -140,6 +145,7 @@ impl<'d> Acting<'d> {
         let (dt, before) = (self.drive.dt(), self.before);
         let mut now = self.at(0);
         now.between = None;
+        now.u = &self.inputs_before;
         (now.t, now.dt) = match i {
             0 => (before.begun, before.first),
             i => (now.t - (before.steps - i) as f64 * dt, dt),
@@ -184,14 +190,29 @@ impl<'d> Acting<'d> {
             // Nothing moves to a replicate; what is asked here is asked at a usual step.
             now.dt = drive.dt();
         }
-        if self.hold != Hold::Zero {
+        if !self.holds.is_empty() {
             let next = drive.input((k + 1).min(drive.samples() - 1));
-            now.between = Some(Between {
-                next,
-                share: 0.0,
-                hold: self.hold,
-            });
+            let holds = &self.holds;
+            now.between = Some(Between { next, holds });
         }
+    }
+}
+
+/// Inputs of a row without what is added at it.
+fn without_amounts(inputs: &[f64], holds: &[Hold]) -> Vec<f64> {
+    let all = inputs.iter().zip(holds);
+    all.map(|(u, hold)| match hold {
+        Hold::Impulse => 0.0,
+        _ => *u,
+    })
+    .collect()
+}
+
+/// Rules of inputs, none where all are held.
+fn between(holds: Vec<Hold>) -> Vec<Hold> {
+    match holds.iter().all(|hold| *hold == Hold::Zero) {
+        true => vec![],
+        false => holds,
     }
 }
 
@@ -247,15 +268,15 @@ pub(crate) struct RunSetup<'s> {
 /// The simulation loop. Allocates its buffers once; nothing inside the loop.
 pub(super) fn simulate(
     twin: &impl RunningTwin,
-    setup: RunSetup<'_>,
+    setup: &mut RunSetup<'_>,
     noise: Noise,
 ) -> Result<Signal, SimulationError> {
     let RunSetup {
         outline,
         limits,
         acting,
-        mut dead_time,
-        mut work,
+        dead_time,
+        work,
     } = setup;
     let (samples, n, p) = (
         acting.samples(),
@@ -273,7 +294,7 @@ pub(super) fn simulate(
     let mut outputs = vec![0.0; samples * p];
     // One step, and the noise of it.
     let mut carry = |now: &Now<'_>, q: &[f64], x: &mut [f64]| {
-        twin.step(now, x, &mut work);
+        twin.step(now, x, work);
         if !noise.is_off() {
             for ((x, q), w) in x.iter_mut().zip(q).zip(&mut process) {
                 if *q != 0.0 {
@@ -282,7 +303,7 @@ pub(super) fn simulate(
             }
         }
         twin.constrain(now, x);
-        for &(i, limit) in &limits {
+        for &(i, limit) in limits.iter() {
             x[i] = limit.clamp(x[i]);
         }
         match x.iter().all(|v| v.is_finite()) {
@@ -293,7 +314,7 @@ pub(super) fn simulate(
     let first = acting.start();
     twin.start(&first, &mut x);
     if !noise.is_off() {
-        draw_start(twin, &first, (outline, &limits), noise, &mut x);
+        draw_start(twin, &first, (outline, limits), noise, &mut x);
     }
     for i in 0..acting.steps_before() {
         let now = acting.before(i);

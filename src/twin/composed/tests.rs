@@ -41,7 +41,13 @@ const RULES: [Integrator; 2] = [Integrator::Euler, Integrator::RungeKutta4];
 
 fn refined(rule: Integrator, substeps: usize, hold: Hold) -> Twin {
     let twin = Twin::new(Vessel(rule));
-    let change = |_: &mut _, to: &mut Stepping| *to = Stepping { substeps, hold };
+    let change = |_: &mut _, to: &mut Stepping| {
+        *to = Stepping {
+            substeps,
+            hold,
+            ..*to
+        }
+    };
     twin.stepped(change).unwrap()
 }
 

@@ -7,6 +7,8 @@ use crate::twin::{Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, T
 
 /// Largest error of the step where no noise is declared, as a share of an output's deviation.
 const STEP_SHARE: f64 = 0.01;
+/// Share of the tolerance of adaptive steps that stands for exact ones.
+const FINER: f64 = 0.01;
 /// Runs that show what process noise does to an output without measurement noise: its scatter is known to a quarter.
 const NOISY_RUNS: u64 = 8;
 
@@ -16,7 +18,11 @@ pub(crate) fn step_error(
     theta: &[f64],
     drive: &Drive,
 ) -> Result<Vec<(String, f64)>, SimulationError> {
-    let Some(finer) = twin.stepped(|_, stepping| stepping.substeps *= 2) else {
+    let finer = twin.stepped(|_, stepping| {
+        stepping.substeps *= 2;
+        stepping.tolerance *= FINER;
+    });
+    let Some(finer) = finer else {
         return Ok(vec![]);
     };
     let difference = twin.free_run(theta, drive)? - finer.free_run(theta, drive)?;
@@ -30,7 +36,12 @@ pub(crate) fn step_error(
 pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Finding> {
     let outcome: Outcome = match coarse_step(twin, theta, drive)? {
         Ok(Some(coarse)) => warned(coarse),
-        Ok(None) => Ok("half the step moves no output by more than its noise".into()),
+        Ok(None) => Ok(
+            match twin.equations().map(|own| own.steps_taken(theta, drive)) {
+                Some(Ok(Some(taken))) => taken.text(),
+                _ => "half the step moves no output by more than its noise".into(),
+            },
+        ),
         Err(error) => warned(format!("not known: {error}")),
     };
     Some(Finding::of("step", outcome))
@@ -59,6 +70,13 @@ pub(crate) fn coarse_step(
         .collect();
     if coarse.is_empty() {
         return Some(Ok(None));
+    }
+    if equations.workspace().steps_taken().is_some() {
+        let tolerance = equations.stepping().tolerance * FINER;
+        return Some(Ok(Some(format!(
+            "too long: with finer ones, {}; give the study tolerance = {tolerance:e}",
+            coarse.join("; ")
+        ))));
     }
     let substeps = (4 * equations.stepping().substeps).min(MOST_SUBSTEPS);
     Some(Ok(Some(format!(

@@ -126,6 +126,7 @@ fn feedthrough_sees_the_present_input() {
                 states: vec![Quantity::new("x", "")],
                 inputs: vec![Quantity::new("u", "")],
                 outputs: vec![Quantity::new("y", "")],
+                ..Outline::new()
             }
         }
         fn drift(&self, _: &Now<'_>, _: &[f64], dx: &mut [f64]) {

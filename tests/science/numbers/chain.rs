@@ -86,6 +86,7 @@ impl StateSpace for Chain {
             states: named("x", self.tanks),
             inputs: named("u", 1),
             outputs: named("y", self.measured),
+            ..Outline::new()
         }
     }
 

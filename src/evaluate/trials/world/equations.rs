@@ -4,7 +4,7 @@ use super::{RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, Moment, above};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::record::{Drive, Signal};
-use crate::twin::{Acting, Composed, DeadTime, Interval, Noise, Now};
+use crate::twin::{Acting, Between, Composed, DeadTime, Interval, Noise, Now};
 use ndarray::ArrayView1;
 
 /// Makes a record; `None` where a state diverges.
@@ -205,14 +205,18 @@ impl Plant<'_> {
     fn advance(&mut self, now: &Now<'_>, next: &[f64], command: &[f64], x: &mut [f64]) {
         let h = now.dt / TRIAL.world_substeps as f64;
         let mut inputs = now.u.to_vec();
-        let hold = self.twin.stepping().hold;
+        let holds = self.twin.holds();
+        let between = Between {
+            next,
+            holds: &holds,
+        };
+        let mut drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.twin.drift(now, x, dx);
+        between.jump(now, x, &mut inputs, &mut drift);
         for step in 0..TRIAL.world_substeps {
             for (stage, part) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
                 let share = (step as f64 + part) / TRIAL.world_substeps as f64;
-                let of_next = hold.share(step, TRIAL.world_substeps, part);
-                for ((u, from), to) in inputs.iter_mut().zip(now.u).zip(next) {
-                    *u = from + of_next * (to - from);
-                }
+                let middle = (step as f64 + 0.5) / TRIAL.world_substeps as f64;
+                between.inputs_at(share, middle, now.u, &mut inputs);
                 let at = Now::new(now.t + share * now.dt, h, &inputs, now.theta);
                 for (i, value) in self.stage.iter_mut().enumerate() {
                     let before = stage.checked_sub(1).map_or(0.0, |s| self.slopes[s][i]);

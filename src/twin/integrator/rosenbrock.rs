@@ -1,0 +1,163 @@
+//! The L-stable method of orders 4 and 3 of Hairer and Wanner for stiff equations, RODAS: *Solving Ordinary Differential Equations II*,
+//! section IV.7 and the code of that name.
+
+use super::path::{Path, Stretch};
+use nalgebra::{DMatrix, DVectorView, Dyn, LU};
+
+const GAMMA: f64 = 0.25;
+const NODES: [f64; 6] = [0.0, 0.386, 0.21, 0.63, 1.0, 1.0];
+/// Weights of ∂f/∂t at each stage.
+const OF_TIME: [f64; 6] = [0.25, -0.1043, 0.1035, -0.0362, 0.0, 0.0];
+/// Weights of earlier increments at which each stage takes its rates.
+const STAGES: [&[f64]; 6] = [
+    &[],
+    &[1.544],
+    &[0.9466785280815826, 0.2557011698983284],
+    &[3.314825187068521, 2.896124015972201, 0.9986419139977817],
+    &[
+        1.221224509226641,
+        6.019134481288629,
+        12.53708332932087,
+        -0.687886036105895,
+    ],
+    &[
+        1.221224509226641,
+        6.019134481288629,
+        12.53708332932087,
+        -0.687886036105895,
+        1.0,
+    ],
+];
+/// Weights of earlier increments over h in each stage's right side.
+const RIGHT: [&[f64]; 6] = [
+    &[],
+    &[-5.6688],
+    &[-2.430093356833875, -0.2063599157091915],
+    &[-0.1073529058151375, -9.594562251023355, -20.47028614809616],
+    &[
+        7.496443313967647,
+        -10.24680431464352,
+        -33.99990352819905,
+        11.7089089320616,
+    ],
+    &[
+        8.083246795921522,
+        -7.981132988064893,
+        -31.52159432874371,
+        16.31930543123136,
+        -6.058818238834054,
+    ],
+];
+/// Order of the error that is estimated.
+pub(super) const ORDER: f64 = 4.0;
+/// Difference for derivatives, as a share of the number: half of its digits.
+const HALF_DIGITS: f64 = 1.5e-8;
+/// Difference of time, as a share of the step: far below it, and above what rounding leaves of a clock of days.
+const OF_STEP: f64 = 1e-5;
+
+/// Buffers of the method.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Rosenbrock {
+    increments: [Vec<f64>; 6],
+    stage: Vec<f64>,
+    /// Rates where the step begins, their change with time, and those of a stage.
+    rates: [Vec<f64>; 3],
+}
+
+impl Rosenbrock {
+    /// Carries points of `n` states each over a stretch; `sizes` are usual sizes of the states. `error`, of the first point, is the
+    /// difference between both orders.
+    pub fn step(
+        &mut self,
+        path: &mut Path<'_, '_>,
+        of: Stretch,
+        (sizes, x): (&[f64], &mut [f64]),
+        error: Option<&mut [f64]>,
+    ) {
+        let (h, n) = (path.seconds(of), sizes.len());
+        for buffer in (self.increments.iter_mut()).chain(&mut self.rates) {
+            buffer.resize(x.len(), 0.0);
+        }
+        self.stage.clear();
+        self.stage.extend_from_slice(x);
+        path.rates(of, 0.0, x, &mut self.rates[0]);
+        let solvers = self.solvers(path, of, (sizes, x));
+        let [first, by_time, now] = &mut self.rates;
+        path.rates(of, OF_STEP, x, by_time);
+        for (by_time, first) in by_time.iter_mut().zip(&*first) {
+            *by_time = (*by_time - first) / (OF_STEP * h);
+        }
+        for i in 0..6 {
+            let (before, rest) = self.increments.split_at_mut(i);
+            let increment = &mut rest[0];
+            self.stage.copy_from_slice(x);
+            added(&mut self.stage, 1.0, STAGES[i], before);
+            if i == 0 {
+                now.copy_from_slice(first);
+            } else {
+                path.rates(of, NODES[i], &self.stage, now);
+            }
+            for ((increment, now), by_time) in increment.iter_mut().zip(&*now).zip(&*by_time) {
+                *increment = now + h * OF_TIME[i] * by_time;
+            }
+            added(increment, 1.0 / h, RIGHT[i], before);
+            for (solver, part) in solvers.iter().zip(increment.chunks_exact_mut(n)) {
+                let solved = solver.solve(&DVectorView::from_slice(part, n));
+                match solved {
+                    Some(solved) => part.copy_from_slice(solved.as_slice()),
+                    None => part.fill(f64::NAN),
+                }
+            }
+        }
+        if let Some(error) = error {
+            error.copy_from_slice(&self.increments[5][..n]);
+        }
+        for ((x, stage), last) in x.iter_mut().zip(&self.stage).zip(&self.increments[5]) {
+            *x = stage + last;
+        }
+    }
+
+    /// Decompositions of 1/(γh) − ∂f/∂x, one for each point, by differences that all points share.
+    fn solvers(
+        &mut self,
+        path: &mut Path<'_, '_>,
+        of: Stretch,
+        (sizes, x): (&[f64], &[f64]),
+    ) -> Vec<LU<f64, Dyn, Dyn>> {
+        let (h, n) = (path.seconds(of), sizes.len());
+        let [first, _, now] = &mut self.rates;
+        let mut matrices = vec![DMatrix::zeros(n, n); x.len() / n];
+        for j in 0..n {
+            for (p, stage) in self.stage.chunks_exact_mut(n).enumerate() {
+                let rate = first[p * n + j];
+                let size = x[p * n + j].abs().max(sizes[j]).max((h * rate).abs());
+                stage[j] += HALF_DIGITS * size.max(f64::MIN_POSITIVE.sqrt());
+            }
+            path.rates(of, 0.0, &self.stage, now);
+            for (p, matrix) in matrices.iter_mut().enumerate() {
+                let at = p * n;
+                let difference = self.stage[at + j] - x[at + j];
+                for i in 0..n {
+                    matrix[(i, j)] = (first[at + i] - now[at + i]) / difference;
+                }
+                self.stage[at + j] = x[at + j];
+            }
+        }
+        let decomposed = matrices.into_iter().map(|mut matrix| {
+            for i in 0..n {
+                matrix[(i, i)] += 1.0 / (GAMMA * h);
+            }
+            matrix.lu()
+        });
+        decomposed.collect()
+    }
+}
+
+/// Adds weighted increments, all times a factor.
+fn added(to: &mut [f64], factor: f64, weights: &[f64], increments: &[Vec<f64>]) {
+    for (weight, increment) in weights.iter().zip(increments) {
+        for (to, increment) in to.iter_mut().zip(increment) {
+            *to += factor * weight * increment;
+        }
+    }
+}

@@ -1,0 +1,258 @@
+use super::pair::ExplicitPair;
+use super::path::Stretch;
+use super::rosenbrock::Rosenbrock;
+use super::*;
+use crate::twin::Interval;
+
+/// Global error of ẋ = −x + t at t = 1, whose solution is 2e^{−t} + t − 1.
+fn error(steps: usize, mut step: impl FnMut(&Now<'_>, &mut [f64])) -> f64 {
+    let (dt, mut x) = (1.0 / steps as f64, [1.0]);
+    for k in 0..steps {
+        step(&Now::new(k as f64 * dt, dt, &[], &[]), &mut x);
+    }
+    (x[0] - 2.0 * (-1.0f64).exp()).abs()
+}
+
+/// The pendulum in a wind that grows: orders of a linear equation say nothing of the conditions of others.
+fn pendulum(now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+    for (x, dx) in x.chunks_exact(2).zip(dx.chunks_exact_mut(2)) {
+        dx[0] = x[1];
+        dx[1] = -9.81 * x[0].sin() + now.t * now.t;
+    }
+}
+
+/// Halving the step divides the error by 2^order.
+#[test]
+fn convergence_orders() {
+    for (integrator, order) in [(Integrator::Euler, 1.0), (Integrator::RungeKutta4, 4.0)] {
+        let of = |steps| {
+            let mut work = StepBuffers::of(1);
+            error(steps, |now, x| {
+                integrator.step(now, x, &mut work, |now, x, dx| dx[0] = now.t - x[0]);
+            })
+        };
+        let measured = (of(20) / of(40)).log2();
+        assert!(
+            (measured - order).abs() < 0.15,
+            "{integrator:?}: {measured}"
+        );
+    }
+    let end = |steps: usize, is_implicit: bool| {
+        let (mut explicit, mut implicit) = (ExplicitPair::default(), Rosenbrock::default());
+        let now = Now::new(0.0, 1.0, &[], &[]);
+        let mut x = [1.0, 0.0];
+        for k in 0..steps {
+            let length = 1.0 / steps as f64;
+            let of = Stretch {
+                from: k as f64 * length,
+                length,
+            };
+            let mut path = Path {
+                now: &now,
+                inputs: &mut [],
+                drift: &mut pendulum,
+            };
+            match is_implicit {
+                true => implicit.step(&mut path, of, (&[1.0, 1.0], &mut x), None),
+                false => explicit.step(&mut path, of, &mut x, None),
+            }
+        }
+        x
+    };
+    let exact = end(2000, false);
+    for (is_implicit, order) in [(false, 5.0), (true, 4.0)] {
+        let error = |steps| (end(steps, is_implicit)[0] - exact[0]).abs();
+        let measured = (error(20) / error(40)).log2();
+        assert!((measured - order).abs() < 0.3, "{is_implicit}: {measured}");
+    }
+}
+
+/// State at `t`, from a start, in samples of this length.
+fn carried<const N: usize>(
+    (rule, tolerance): (Integrator, f64),
+    start: [f64; N],
+    (t, samples): (f64, usize),
+    rates: impl Fn(f64, &[f64], &mut [f64]),
+) -> ([f64; N], StepsTaken) {
+    let stepping = Stepping {
+        tolerance,
+        ..Stepping::default()
+    };
+    let mut work = Workspace::of(&[], &[Interval::EVERYTHING; N], (rule, stepping));
+    let (mut x, dt) = (start, t / samples as f64);
+    for k in 0..samples {
+        let now = Now::new(k as f64 * dt, dt, &[], &[]);
+        work.carry(N, &now, &mut x, |now, x, dx| {
+            for (x, dx) in x.chunks_exact(N).zip(dx.chunks_exact_mut(N)) {
+                rates(now.t, x, dx);
+            }
+        });
+    }
+    (x, work.steps_taken().unwrap())
+}
+
+fn robertson(_: f64, x: &[f64], dx: &mut [f64]) {
+    dx[0] = -0.04 * x[0] + 1e4 * x[1] * x[2];
+    dx[2] = 3e7 * x[1] * x[1];
+    dx[1] = -dx[0] - dx[2];
+}
+
+fn hires(_: f64, y: &[f64], d: &mut [f64]) {
+    d[0] = -1.71 * y[0] + 0.43 * y[1] + 8.32 * y[2] + 0.0007;
+    d[1] = 1.71 * y[0] - 8.75 * y[1];
+    d[2] = -10.03 * y[2] + 0.43 * y[3] + 0.035 * y[4];
+    d[3] = 8.32 * y[1] + 1.71 * y[2] - 1.12 * y[3];
+    d[4] = -1.745 * y[4] + 0.43 * y[5] + 0.43 * y[6];
+    d[5] = -280.0 * y[5] * y[7] + 0.69 * y[3] + 1.71 * y[4] - 0.43 * y[5] + 0.69 * y[6];
+    d[6] = 280.0 * y[5] * y[7] - 1.81 * y[6];
+    d[7] = -d[6];
+}
+
+/// The oscillator of van der Pol with ν = 1000, in its own time.
+fn van_der_pol(_: f64, x: &[f64], dx: &mut [f64]) {
+    dx[0] = x[1];
+    dx[1] = 1000.0 * (1.0 - x[0] * x[0]) * x[1] - x[0];
+}
+
+fn brusselator(_: f64, x: &[f64], dx: &mut [f64]) {
+    dx[0] = 1.0 + x[0] * x[0] * x[1] - 4.0 * x[0];
+    dx[1] = 3.0 * x[0] - x[0] * x[0] * x[1];
+}
+
+/// A motor of 0.5 mH and 2 Ω (0.25 ms), seen every 5 ms.
+fn motor(t: f64, x: &[f64], dx: &mut [f64]) {
+    let voltage = 12.0 * (20.0 * t).sin();
+    dx[0] = (voltage - 2.0 * x[0] - 0.05 * x[1]) / 5e-4;
+    dx[1] = (0.05 * x[0] - 1e-5 * x[1]) / 1e-4;
+}
+
+/// Largest difference of any state, as a share of its size.
+fn apart<const N: usize>(a: [f64; N], b: [f64; N], sizes: [f64; N]) -> f64 {
+    (0..N)
+        .map(|i| (a[i] - b[i]).abs() / sizes[i])
+        .fold(0.0, f64::max)
+}
+
+/// Published values (Mazzia, Magherini: *Test Set for Initial Value Problem Solvers*; Robertson at 40 s: Shampine), and steps to 10⁻¹²:
+/// within a millionth of the scale of each state at the usual tolerance, whatever rule is asked for.
+#[test]
+fn stiff_systems_are_carried_to_a_millionth_of_their_scale() {
+    use Integrator::{Adaptive, Stiff};
+    let at = |rule| (rule, TOLERANCE);
+    for rule in [Adaptive, Stiff] {
+        let (x, _) = carried(at(rule), [1.0, 0.0, 0.0], (40.0, 40), robertson);
+        let known = [
+            0.715_827_068_719_394,
+            9.185534764557338e-6,
+            0.2841637457458413,
+        ];
+        let off = apart(x, known, [1.0, 4e-5, 1.0]);
+        assert!(off < 1e-6, "Robertson, {rule:?}: {off:e}");
+
+        let start = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0057];
+        let (x, taken) = carried(at(rule), start, (321.8122, 300), hires);
+        let known = [
+            0.7371312573325668e-3,
+            0.1442485726316185e-3,
+            0.5888729740967575e-4,
+            0.1175651343283149e-2,
+            0.2386356198831331e-2,
+            0.6238968252742796e-2,
+            0.2849998395185769e-2,
+            0.2850001604814231e-2,
+        ];
+        let off = apart(x, known, [1.0, 0.2, 0.05, 0.5, 0.05, 0.3, 5.7e-3, 5.7e-3]);
+        assert!(off < 1e-6, "HIRES, {rule:?}: {off:e}, {taken:?}");
+
+        // In time over ν: 2 units, at which the speed over ν is known.
+        let (x, taken) = carried(at(rule), [2.0, -0.66e-3], (2000.0, 400), van_der_pol);
+        let known = [1.706167732170483, -0.8928097010247975e-3];
+        let off = apart(x, known, [2.0, 1.3]);
+        assert!(off < 1e-6, "van der Pol, {rule:?}: {off:e}, {taken:?}");
+
+        let (exact, _) = carried((Adaptive, 1e-12), [1.5, 3.0], (20.0, 200), brusselator);
+        let (x, _) = carried(at(rule), [1.5, 3.0], (20.0, 200), brusselator);
+        let off = apart(x, exact, [4.0, 5.0]);
+        assert!(off < 1e-6, "Brusselator, {rule:?}: {off:e}");
+
+        let (exact, _) = carried((Adaptive, 1e-12), [0.0; 2], (0.5, 5000), motor);
+        let (x, _) = carried(at(rule), [0.0; 2], (0.5, 100), motor);
+        let off = apart(x, exact, [6.0, 240.0]);
+        assert!(off < 1e-6, "motor, {rule:?}: {off:e}");
+    }
+}
+
+/// Explicit steps stay where they serve, and give way where they are many.
+#[test]
+fn the_method_follows_the_system() {
+    let adaptive = (Integrator::Adaptive, TOLERANCE);
+    let (_, taken) = carried(adaptive, [1.5, 3.0], (20.0, 200), brusselator);
+    assert_eq!(taken.implicit, 0, "{taken:?}");
+    let (_, taken) = carried(adaptive, [2.0, 0.0], (2000.0, 400), van_der_pol);
+    assert!(taken.implicit > 390 && taken.substeps < 20_000, "{taken:?}");
+    // A force that changes its sign at every step of a body at rest is not stiff, and ends.
+    let (x, taken) = carried(adaptive, [1.0], (3.0, 30), |_, x, dx| {
+        dx[0] = -x[0].signum()
+    });
+    assert!(x[0].abs() < 1e-3, "{x:?}");
+    assert!(taken.implicit == 0 && taken.most < 100, "{taken:?}");
+}
+
+/// All points take the steps of the centre: beside it, differences are those of one smooth function.
+#[test]
+fn points_take_the_steps_of_the_centre() {
+    let rates = |_: &Now<'_>, x: &[f64], dx: &mut [f64]| {
+        for (x, dx) in x.chunks_exact(2).zip(dx.chunks_exact_mut(2)) {
+            van_der_pol(0.0, x, dx);
+        }
+    };
+    let now = Now::new(0.0, 5.0, &[], &[]);
+    let limits = [Interval::EVERYTHING; 2];
+    let rule = (Integrator::Adaptive, Stepping::default());
+    let mut work = Workspace::of(&[], &limits, rule);
+    let at = |work: &mut Workspace, x: f64| {
+        let mut points = [2.0, 0.0, x, 0.0];
+        work.carry(2, &now, &mut points, rates);
+        points[2]
+    };
+    let before = at(&mut work, 2.0);
+    let taken = work.steps_taken().unwrap();
+    let slope = (at(&mut work, 2.0 + 1e-7) - before) / 1e-7;
+    for k in 1..50 {
+        let shift = 1e-9 * f64::from(k);
+        let off = at(&mut work, 2.0 + shift) - before - slope * shift;
+        assert!(off.abs() < 1e-13, "{k}: {off:e}");
+    }
+    assert_eq!(work.steps_taken().unwrap(), taken, "one schedule");
+}
+
+/// An amount is in the state behind its row, whatever the rule; other inputs are as they say.
+#[test]
+fn amounts_are_added_at_their_rows() {
+    let holds = [Hold::Impulse, Hold::Linear];
+    let rates = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
+        dx[0] = -0.5 * x[0] + 2.0 * now.u[0];
+        dx[1] = now.u[1];
+    };
+    for rule in [
+        Integrator::Adaptive,
+        Integrator::Stiff,
+        Integrator::RungeKutta4,
+    ] {
+        let limits = [Interval::EVERYTHING; 2];
+        let mut work = Workspace::of(&holds, &limits, (rule, Stepping::default()));
+        let between = Between {
+            next: &[0.0, 3.0],
+            holds: &holds,
+        };
+        let now = Now {
+            between: Some(between),
+            ..Now::new(0.0, 0.2, &[4.0, 1.0], &[])
+        };
+        let mut x = [1.0, 0.0];
+        work.carry(2, &now, &mut x, rates);
+        let decayed = 9.0 * (-0.1f64).exp();
+        assert!((x[0] - decayed).abs() < 1e-6, "{rule:?}: {x:?}");
+        assert!((x[1] - 0.4).abs() < 1e-12, "{rule:?}: {x:?}");
+    }
+}
