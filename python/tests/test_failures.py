@@ -42,6 +42,35 @@ def test_wrong_arguments_are_refused_before_the_program_starts(record):
         twin.fit({**record, "temperature": ["warm"] * 100})
     with pytest.raises(TypeError, match="a record of type int"):
         twin.fit([3])
+    with pytest.raises(TypeError, match="records of type NoneType; give a path"):
+        twin.fit(None)
+
+
+def test_masked_samples_are_missing(twin, record):
+    bad = record["temperature"].copy()
+    bad[20:30] = 99.0
+    masked = np.ma.masked_greater(bad, 50.0)
+    filled = twin.fit({**record, "temperature": masked.filled(np.nan)})
+    assert twin.fit({**record, "temperature": masked}).parameters == filled.parameters
+    pandas = pytest.importorskip("pandas")
+    nullable = pandas.array(np.where(masked.mask, 0.0, bad), dtype="Float64")
+    nullable[masked.mask] = pandas.NA
+    frame = pandas.DataFrame({"t": record["t"], "power": record["power"], "temperature": nullable})
+    assert twin.fit(frame).parameters == filled.parameters
+
+
+def test_numbers_that_mean_nothing_are_refused(twin, record):
+    with pytest.raises(ValueError, match="temperature: complex values; give real ones"):
+        twin.fit({**record, "temperature": record["temperature"] + 1j})
+    for noise in (-1.0, float("nan"), float("inf"), {"temperature": -0.1}):
+        with pytest.raises(ValueError, match="give a standard deviation, 0 or more"):
+            truetwin.Twin(heater, **SETTING, noise=noise)
+    for hold in (0, -3, 2.5):
+        with pytest.raises(ValueError, match=f"hold = {hold}; give a whole number"):
+            truetwin.Twin(heater, **SETTING, levels=(-1, 1), hold=hold)
+    twisted = truetwin.Twin(lambda parameters, inputs, time: np.ones(time.size) * 1j, **SETTING)
+    with pytest.raises(truetwin.TruetwinError, match="the simulator returned complex values"):
+        twisted.simulate({"gain": 2.0, "tau": 10.0}, {"t": record["t"], "power": record["power"]})
 
 
 def test_a_wrong_description_is_named():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
@@ -32,6 +32,8 @@ def as_list(records: Records) -> list[Record]:
     """Return one or several records as a list."""
     if isinstance(records, (str, os.PathLike, Mapping)) or is_frame(records):
         return [records]  # type: ignore[list-item, unused-ignore]
+    if not isinstance(records, Iterable):
+        raise TypeError(f"records of type {type(records).__name__}; give a path, a DataFrame, a dict of arrays, or a list of these")
     return list(records)  # type: ignore[arg-type, unused-ignore]
 
 
@@ -96,16 +98,24 @@ class Writer:
 
 
 def _numbers(name: str, values: Any) -> Array:
-    """Return a column as floats; time stamps as seconds from the first."""
-    if hasattr(getattr(values, "dtype", None), "tz"):
+    """Return a column as floats, nan where it is masked; time stamps as seconds from the first."""
+    dtype = getattr(values, "dtype", None)
+    if hasattr(dtype, "tz"):
         values = values.to_numpy(dtype="datetime64[ns]")
+    elif hasattr(dtype, "na_value") and hasattr(values, "to_numpy") and getattr(dtype, "kind", "") in "biuf":
+        # The nullable numbers of pandas.
+        values = values.to_numpy(dtype=float, na_value=np.nan)
     array = np.asarray(values)
+    mask = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
+    if array.dtype.kind == "c":
+        raise ValueError(f"record, column {name}: complex values; give real ones, such as their real parts or magnitudes")
     if array.ndim != 1:
         raise ValueError(f"record, column {name}: shape {array.shape}; give one value per sample")
     if array.dtype.kind in "mM" and array.size:
-        return np.asarray((array - array[0]) / np.timedelta64(1, "s"), dtype=float)
+        array = np.asarray((array - array[0]) / np.timedelta64(1, "s"), dtype=float)
     try:
-        return np.asarray(array, dtype=float)
+        floats = np.asarray(array, dtype=float)
+        return floats if mask is None else np.where(mask, np.nan, floats)
     except (TypeError, ValueError):
         raise ValueError(f"record, column {name}: {array.dtype} holds other values than numbers; give numbers, nan where missing") from None
 

@@ -72,9 +72,9 @@ class Model:
         self.takes_seed = _takes(simulator, "seed")
         self._kept: dict[bytes, dict[str, Array]] = {}
         self._times: dict[tuple[float, int, float], Array] = {}
-        record: dict[str, Any] = {"step": self.step, "samples": int(samples)}
+        record: dict[str, Any] = {"step": self.step, "samples": whole("samples", samples)}
         if levels is not None:
-            record["input"] = {"levels": [float(level) for level in levels], "hold": int(hold)}
+            record["input"] = {"levels": [float(level) for level in levels], "hold": whole("hold", hold)}
         self.description = {
             "name": self.name,
             "parameters": [_described(key, value) for key, value in self.parameters.items()],
@@ -140,11 +140,11 @@ class Model:
         if isinstance(result, Mapping):
             if set(result) != set(names):
                 raise ValueError(f"the simulator returned the outputs {_list(result)}; return {_list(names)}")
-            columns = [np.asarray(result[key], dtype=float) for key in names]
+            columns = [_reals(result[key]) for key in names]
         elif isinstance(result, tuple) and len(result) == len(names):
-            columns = [np.asarray(column, dtype=float) for column in result]
+            columns = [_reals(column) for column in result]
         else:
-            table = np.asarray(result, dtype=float)
+            table = _reals(result)
             if table.ndim == 2 and table.shape[1] == len(names):
                 columns = list(table.T)
             elif len(names) == 1:
@@ -176,6 +176,28 @@ def _numbers(values: Array) -> str:
     """Return numbers with all their digits; nan and inf are known to the program."""
     # A third faster than json.dumps, and most of the time between two runs.
     return ",".join(["%.17g"] * values.size) % tuple(values.tolist())
+
+
+def _reals(values: Any) -> Array:
+    """Return outputs as floats, nan where they are masked."""
+    if np.iscomplexobj(values):
+        raise ValueError("the simulator returned complex values; return real ones, such as their real parts or magnitudes")
+    if isinstance(values, np.ma.MaskedArray):
+        return np.asarray(np.ma.filled(values.astype(float), np.nan))
+    return np.asarray(values, dtype=float)
+
+
+def whole(name: str, value: int) -> int:
+    """Return a number of samples; refuse one that is not whole, or below 1."""
+    if value != int(value) or value < 1:
+        raise ValueError(f"{name} = {value}; give a whole number of samples, at least 1")
+    return int(value)
+
+
+def check_noise(level: object) -> None:
+    """Refuse a noise level that is negative or no finite number; expressions are checked by the program."""
+    if isinstance(level, (int, float, np.number)) and not 0 <= level < np.inf:
+        raise ValueError(f"noise = {level}; give a standard deviation, 0 or more, in the unit of the output")
 
 
 def _frozen(values: Array) -> Array:

@@ -17,7 +17,7 @@ from ._records import Record, Records
 from ._report import Report
 from ._results import Check, Diagnosis, Estimate, Estimator, Fit, Json, Scorecard
 from ._server import Server
-from ._simulator import Array, Model, Parameter, Range, Simulator, _units
+from ._simulator import Array, Model, Parameter, Range, Simulator, _units, check_noise, whole
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped, unused-ignore]
@@ -109,6 +109,8 @@ class Twin:
         self._workers = workers
         self._timeout = timeout
         self._noise: dict[str, float] = {}
+        for level in noise.values() if isinstance(noise, Mapping) else [] if noise is None else [noise]:
+            check_noise(level)
         self._model: Model | None = None
         self._text: Text | None = None
         if states is not None:
@@ -116,9 +118,9 @@ class Twin:
                 raise ValueError("states and a callable or a study; equations stand alone")
             if not parameters or not isinstance(outputs, Mapping) or not outputs:
                 raise ValueError("equations need parameters={name: (low, high)} and outputs={name: expression}")
-            plan: dict[str, Any] = {} if step is None else {"step": float(step), "samples": int(samples)}
+            plan: dict[str, Any] = {} if step is None else {"step": float(step), "samples": whole("samples", samples)}
             if levels is not None:
-                plan["input"] = {"levels": [float(level) for level in levels], "hold": int(hold)}
+                plan["input"] = {"levels": [float(level) for level in levels], "hold": whole("hold", hold)}
             self._text = Text(
                 name or "twin", parameters, _noisy(states, noise, outputs, True), inputs if isinstance(inputs, Mapping) else _units(inputs),
                 _noisy(outputs, noise, outputs, False), constants or {}, define or {}, {**plan, **(record or {})},
