@@ -16,9 +16,14 @@ use std::process::ExitCode;
 pub(super) trait Verb {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure>;
 
-    /// Tells whether rerunning the same command resumes the work: what ranks share lies in a folder.
-    fn is_resumed(&self) -> bool {
-        self.is_shared_out()
+    /// Returns the folder that keeps finished work, where rerunning the same command resumes it.
+    fn kept(&self) -> Option<PathBuf> {
+        None
+    }
+
+    /// Tells whether the verb ends with the answer so far when it is stopped.
+    fn has_partial_answer(&self) -> bool {
+        false
     }
 
     /// Tells whether the ranks of a cluster share the work.
@@ -129,7 +134,7 @@ impl Context<'_> {
         of: usize,
     ) -> Result<ExitCode, Failure> {
         let json = json!({
-            "schema": "truetwin.share/1", "folder": folder, "pieces": pieces, "there": done, "of": of,
+            "schema": "truetwin.share/1", "folder": output::name(folder), "pieces": pieces, "there": done, "of": of,
         });
         self.print(&json, || {
             format!(

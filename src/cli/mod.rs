@@ -15,6 +15,7 @@
 //! one line that has the remedy; 1 anything else.
 
 mod arguments;
+mod border;
 mod context;
 mod external;
 mod failure;
@@ -26,6 +27,7 @@ mod progress;
 mod provenance;
 mod records;
 mod remedy;
+mod shell_word;
 mod stop;
 mod verbs;
 
@@ -74,7 +76,8 @@ pub fn run<P: Into<Project>, E: Into<StudyError>>(
         let failure = Failure::user("this verb runs in one process; start it without mpirun");
         return failure.report_of(&ranks);
     }
-    stop::listen();
+    stop::listen(verb, &words);
+    border::keep_quiet();
     stop::report_file_size_limit();
     let projects: Result<Vec<Project>, E> = (projects.into_iter())
         .map(|project| project.map(Into::into))
@@ -87,11 +90,19 @@ pub fn run<P: Into<Project>, E: Into<StudyError>>(
                 words: &words,
                 study_file,
             };
-            in_pool(arguments.threads, || call.dispatch(&projects, &ranks))
+            let work = || in_pool(arguments.threads, || call.dispatch(&projects, &ranks));
+            border::guarded(work)
         });
+    let result = result.map(|code| match code == ExitCode::SUCCESS && stop::asked() {
+        true => {
+            output::say("stopped when the result was complete");
+            ExitCode::from(STOPPED)
+        }
+        false => code,
+    });
     result.unwrap_or_else(|failure| {
         let (code, exit) = match stop::asked() {
-            true => (STOPPED, stop::failure(verb, &words).report_of(&ranks)),
+            true => (STOPPED, stop::failure().report_of(&ranks)),
             false => (failure.code(), failure.report()),
         };
         ranks.abandon(code);

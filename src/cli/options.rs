@@ -1,5 +1,6 @@
 //! Options that several verbs share.
 
+use super::failure::Failure;
 use crate::estimator::PresetName;
 use crate::record::{Columns, RecordReader};
 use crate::study::Study;
@@ -50,6 +51,16 @@ pub(super) struct FileColumns {
 }
 
 impl FileColumns {
+    /// Refuses columns where the call reads no file that has them; `option` would name one.
+    pub fn check_used(&self, is_used: bool, option: &str) -> Result<(), Failure> {
+        match self.columns.is_some() && !is_used {
+            true => Err(Failure::user(format!(
+                "--columns: no file with columns is read; give {option}, or remove it"
+            ))),
+            false => Ok(()),
+        }
+    }
+
     /// Creates a reader of the records of a study; it refuses those with other channels than the twin's.
     pub fn reader(&self, study: &Study) -> RecordReader {
         self.reader_of_any(study).for_twin(study.name())

@@ -2,11 +2,11 @@
 
 use super::failure::Failure;
 pub(super) use super::failure::say;
-use crate::storage::files::{folder, with_remedy};
+use crate::storage::NewFolder;
+use crate::storage::files::with_remedy;
+use crate::storage::place::{check_place, is_taken, probe_file};
 use crate::storage::untrusted::{hidden, printable};
-use crate::storage::{NewFolder, StorageError, sweep_beside};
 use serde_json::Value;
-use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -41,25 +41,32 @@ fn hidden_escaped(json: &str) -> String {
     text
 }
 
-/// Refuses an existing path or a missing parent folder, before the work starts; removes leftovers of killed processes there.
-pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
-    let name = path.display();
-    if fs::symlink_metadata(path).is_ok() {
-        return Err(Failure::user(format!(
-            "{name} exists already; choose another --out or remove it"
-        )));
-    }
-    check_folder(path)?;
-    sweep_beside(path);
-    Ok(())
+/// The name of a path in JSON; bytes that are no text are replacement characters there.
+pub(super) fn name(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
 }
 
-/// Refuses a missing parent folder, before the work starts.
-pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
-    match folder(path).is_dir() {
-        true => Ok(()),
-        false => Err(StorageError::NoParent(path.into()).into()),
+/// Refuses an existing path or a missing parent folder, before the work starts; removes leftovers of killed processes there.
+pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
+    match is_taken(path)? {
+        true => Err(Failure::user(format!(
+            "{} exists already; choose another --out or remove it",
+            path.display()
+        ))),
+        false => Ok(()),
     }
+}
+
+/// As [`check_new`], for a file; checks that one can be written there.
+pub(super) fn check_new_file(path: &Path) -> Result<(), Failure> {
+    check_new(path)?;
+    check_file(path)
+}
+
+/// Checks that a file can be written, before the work starts.
+pub(super) fn check_file(path: &Path) -> Result<(), Failure> {
+    check_place(path)?;
+    Ok(probe_file(path)?)
 }
 
 /// Creates the output folder before the work starts, so that another run with the same `--out` is refused. It appears complete.

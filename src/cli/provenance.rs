@@ -3,12 +3,13 @@
 use super::context::Context;
 use super::failure::Failure;
 use super::output;
+use super::shell_word;
 use crate::report::Document;
-use crate::storage::files::sha256_of;
+use crate::storage::reading::checksum_of_read;
 use jiff::Timestamp;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -44,9 +45,15 @@ pub(super) struct Provenance {
 struct File {
     /// `record`, `validation`, `study`, `estimator`, `input` or `effect`.
     role: &'static str,
+    #[serde(serialize_with = "as_text")]
     path: PathBuf,
-    /// SHA-256 of its bytes; none where it cannot be read again.
+    /// SHA-256 of the bytes that were read.
     sha256: Option<String>,
+}
+
+/// Serializes a path that may be no text.
+fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&output::name(path))
 }
 
 impl Provenance {
@@ -75,7 +82,7 @@ impl Provenance {
         self.files.extend(paths.into_iter().map(|path| File {
             role,
             path: path.as_ref().into(),
-            sha256: sha256_of(path.as_ref()).ok(),
+            sha256: checksum_of_read(path.as_ref()),
         }));
         self
     }
@@ -160,22 +167,22 @@ impl Provenance {
     }
 }
 
-/// The words of a call, without the program's folder and options that change no result.
+/// The words of a call as a shell reads them, without the program's folder and options that change no result.
 pub(super) fn call(program: &str, words: &[OsString]) -> String {
-    let mut call = vec![program.to_owned()];
-    let mut rest = words.iter().skip(1).map(|word| word.to_string_lossy());
+    let mut call = vec![OsStr::new(program)];
+    let mut rest = words.iter().skip(1);
     while let Some(word) = rest.next() {
-        let name = word.split('=').next().unwrap_or_default();
+        let text = word.to_string_lossy();
+        let name = text.split('=').next().unwrap_or_default();
         match SILENT.iter().find(|(silent, _)| *silent == name) {
-            Some((_, true)) if !word.contains('=') => {
+            Some((_, true)) if !text.contains('=') => {
                 rest.next();
             }
             Some(_) => {}
-            None if word.contains(char::is_whitespace) => call.push(format!("'{word}'")),
-            None => call.push(word.into_owned()),
+            None => call.push(word),
         }
     }
-    call.join(" ")
+    shell_word::line(call)
 }
 
 #[cfg(test)]

@@ -1,22 +1,82 @@
-//! Ctrl-C stops the work at its next step and prints how to resume; a second one ends the process at once.
+//! Ctrl-C and SIGTERM: the work stops at its next step, or is left after a moment; a second one ends the process at once.
 
 use super::context::Verb;
-use super::failure::{Failure, STOPPED};
+use super::failure::{Failure, STOPPED, say};
 use super::remedy::Cause;
+use super::shell_word;
+use crate::external::program::end_all;
+use crate::storage::remove_unfinished;
 use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
+static STOP: OnceLock<StoppedCall> = OnceLock::new();
 
-/// Installs the handler of Ctrl-C.
-pub(super) fn listen() {
+/// Time that work has to come to its next step, or to write what it found. The documented limit is 2 s; half of it cuts more training
+/// steps off before they are kept.
+const MOMENT: Duration = Duration::from_millis(1500);
+
+/// The end of a call that is stopped.
+struct StoppedCall {
+    /// The call, as a shell reads it.
+    call: String,
+    /// Folder of finished work that the same call resumes.
+    kept: Option<PathBuf>,
+    /// `true` where the verb ends with what was found so far, which may take longer than a moment.
+    has_partial_answer: bool,
+}
+
+impl StoppedCall {
+    fn text(&self) -> String {
+        let resume = &self.call;
+        match &self.kept {
+            Some(folder) if folder.exists() => {
+                let folder = folder.display();
+                format!("stopped; finished work is kept in {folder}; resume with: {resume}")
+            }
+            _ => "stopped; nothing was written".into(),
+        }
+    }
+}
+
+/// Installs the handler of Ctrl-C for a call of a verb.
+pub(super) fn listen(verb: &dyn Verb, call: &[OsString]) {
+    let _ = STOP.set(StoppedCall {
+        call: shell_word::line(call.iter().map(OsString::as_os_str)),
+        kept: verb.kept(),
+        has_partial_answer: verb.has_partial_answer(),
+    });
     let asked = || {
         if ASKED.swap(true, Ordering::Relaxed) {
-            std::process::exit(STOPPED.into());
+            end();
         }
+        let _ = thread::Builder::new().spawn(leave);
     };
     // An application around this command line keeps its own handler.
     let _ = ctrlc::set_handler(asked);
+}
+
+/// Ends a process whose work does not come to its next step.
+fn leave() {
+    thread::sleep(MOMENT);
+    let Some(stop) = STOP.get() else { return };
+    if stop.has_partial_answer {
+        say("stopping: the answer so far follows; Ctrl-C again ends at once");
+        return;
+    }
+    say(&format!("error: {}", stop.text()));
+    end();
+}
+
+/// Ends the process with nothing of it left behind: neither programs nor unfinished folders.
+fn end() -> ! {
+    end_all();
+    remove_unfinished();
+    std::process::exit(STOPPED.into())
 }
 
 /// Makes a write beyond the limit of file sizes (`ulimit -f`) an error instead of the end of the process.
@@ -37,14 +97,8 @@ pub(super) fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 
-/// Creates the failure of a stopped call; `call` holds its words.
-pub(super) fn failure(verb: &dyn Verb, call: &[OsString]) -> Failure {
-    let words: Vec<_> = call.iter().map(|word| word.to_string_lossy()).collect();
-    let text = match verb.is_resumed() {
-        true => {
-            "stopped; finished work is kept; resume with: ".to_owned() + &shell_words::join(&words)
-        }
-        false => "stopped; nothing was written".into(),
-    };
+/// Creates the failure of the stopped call.
+pub(super) fn failure() -> Failure {
+    let text = STOP.get().map_or("stopped".into(), StoppedCall::text);
     Failure::new(text, Cause::Stop)
 }

@@ -27,7 +27,7 @@ use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::Part;
 use crate::likelihood::kalman::recoverable;
 use crate::likelihood::start_elsewhere;
-use crate::progress::{Progress, Stage};
+use crate::progress::Stage;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use crate::twin::Stepping;
@@ -54,7 +54,7 @@ impl Report<'_> {
     pub fn diagnosis(&self) -> Result<Diagnosis, StudyError> {
         let (known, base) = (&self.found.known, &self.found.evidence.base);
         let (settings, records) = (self.watch.settings, &base.model.problem.records);
-        let detection = self.detection()?;
+        let (detection, is_cut) = self.detection()?;
         let (answer, absorbed) = self.answer()?;
         let (answer, check) = self.checked(answer)?;
         let accepted = self.accepted(&answer).and_then(|e| e.model.as_ref());
@@ -113,7 +113,7 @@ impl Report<'_> {
             proportional_noise: base.noise_at(|part| matches!(part, Part::Share { .. })),
             outliers: base.noise_at(|part| matches!(part, Part::Effect { .. })),
             quick: settings.quick,
-            interrupted: self.found.is_partial,
+            interrupted: self.found.is_partial || is_cut,
             integrator: self.finer().map(|step| step.integrator),
             substeps: self.finer().map(|step| step.stepping.substeps),
             hold: self.other_hold().map(|stepping| stepping.hold),
@@ -169,44 +169,48 @@ impl Report<'_> {
         is_some.then(|| self.found.known.get(&set(&answer.accepted)))?
     }
 
-    /// Evidence for a gap, with a p-value from records that the twin simulates where that is asked for.
-    fn detection(&self) -> Result<Detection, StudyError> {
+    /// Evidence for a gap, with a p-value from records that the twin simulates where that is asked for; and whether fewer than asked for
+    /// were simulated, since the work was stopped.
+    fn detection(&self) -> Result<(Detection, bool), StudyError> {
         let settings = self.watch.settings;
         let own = self.found.known.posterior().log_odds;
         let mut detection = Detection {
             log_evidence: own,
             p_value: None,
-            simulations: settings.calibrate,
+            simulations: 0,
             at_floor: false,
             alpha: settings.alpha,
         };
         if settings.calibrate == 0 {
-            return Ok(detection);
+            return Ok((detection, false));
         }
         let stage = self.watch.progress.stage("calibrate", settings.calibrate);
         let alone = DiagnoseSettings {
             detection_only: true,
             calibrate: 0,
+            give_partial: false,
             ..settings.clone()
         };
+        let unshown = self.watch.progress.unshown();
         let log_odds = |records: &[Record]| {
             let watch = Watch {
                 settings: &alone,
-                progress: &Progress::silent(),
+                progress: &unshown,
             };
             let found = searched(self.study, records, watch)?;
             Ok(found.known.posterior().log_odds)
         };
         let model = &self.found.evidence.base.model;
         let noise = settings.noise().child("null");
-        let simulated = match calibrate(model, settings.calibrate, log_odds, noise, &stage) {
-            Err(StudyError::Cancelled(_)) if settings.give_partial => vec![],
-            simulated => simulated?,
+        let (simulated, is_cut) = calibrate(model, settings, log_odds, noise, &stage)?;
+        detection.simulations = match is_cut {
+            true => simulated.len(),
+            false => settings.calibrate,
         };
         if let Some((p, at_floor)) = p_value(own, &simulated) {
             (detection.p_value, detection.at_floor) = (Some(p), at_floor);
         }
-        Ok(detection)
+        Ok((detection, is_cut))
     }
 
     /// The answer, and listed effects that absorb a parameter gap.

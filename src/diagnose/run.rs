@@ -177,18 +177,51 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
 
-    /// Stops the work once effects were tried one at a time.
-    #[derive(Default)]
-    struct Impatient(AtomicBool);
+    /// Stops the work once so many units of a stage are done.
+    struct Impatient {
+        stage: &'static str,
+        units: u64,
+        asked: AtomicBool,
+    }
+
+    impl Impatient {
+        fn progress(stage: &'static str, units: u64) -> Progress {
+            let asked = AtomicBool::default();
+            Progress::new(Arc::new(Self {
+                stage,
+                units,
+                asked,
+            }))
+        }
+    }
 
     impl Listener for Impatient {
         fn advanced(&self, stage: &str, done: u64, _: u64) {
-            self.0
-                .fetch_or(stage == "explain" && done >= 3, Ordering::Relaxed);
+            let is_enough = stage == self.stage && done >= self.units;
+            self.asked.fetch_or(is_enough, Ordering::Relaxed);
         }
         fn cancelled(&self) -> bool {
-            self.0.load(Ordering::Relaxed)
+            self.asked.load(Ordering::Relaxed)
         }
+    }
+
+    /// A calibration that is stopped counts the records that it has simulated, and the diagnosis is marked as interrupted.
+    #[test]
+    fn a_cancelled_calibration_says_so() {
+        let study = tanks(60);
+        let records = [biased_record(&study, 0.0, 5)];
+        let settings = DiagnoseSettings {
+            give_partial: true,
+            quick: true,
+            calibrate: 1000,
+            ..DiagnoseSettings::default()
+        };
+        let progress = Impatient::progress("calibrate", 2);
+        let found = diagnose(&study, &records, None, &settings, &progress).unwrap();
+        assert!(found.interrupted);
+        let done = found.detection.simulations;
+        assert!((2..100).contains(&done), "{done}");
+        assert_eq!(found.detection.p_value.is_some(), done > 0);
     }
 
     #[test]
@@ -200,7 +233,7 @@ mod tests {
                 give_partial,
                 ..DiagnoseSettings::default()
             };
-            let progress = Progress::new(Arc::new(Impatient::default()));
+            let progress = Impatient::progress("explain", 3);
             diagnose(&study, &records, None, &settings, &progress)
         };
         let partial = found(true).unwrap();

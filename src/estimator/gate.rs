@@ -14,7 +14,7 @@ use crate::estimator::bank::{Draws, FeatureSimulator};
 use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::settings::{GateForm, GateSettings};
-use crate::math::{Whitening, median, quantile, rank_p_value, to_vector};
+use crate::math::{Whitening, median, quantile, rank_p_value, thin_svd, to_vector};
 use crate::progress::{Progress, Stage};
 use crate::record::Drive;
 use crate::twin::Noise;
@@ -274,15 +274,14 @@ fn whitened_median(whitening: &Whitening, jacobians: &[DMatrix<f64>]) -> DMatrix
 
 /// Orthonormal basis of the columns of `matrix`.
 fn column_space(matrix: &DMatrix<f64>) -> DMatrix<f64> {
-    let svd = matrix.clone().svd(true, false);
-    let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
-    let kept: Vec<usize> = (0..svd.singular_values.len())
-        .filter(|&i| svd.singular_values[i] > 1e-9 * largest)
+    let Some(svd) = thin_svd(matrix) else {
+        return DMatrix::zeros(matrix.nrows(), 0);
+    };
+    let largest = svd.values.iter().copied().fold(0.0, f64::max);
+    let kept: Vec<usize> = (0..svd.values.len())
+        .filter(|&i| svd.values[i] > 1e-9 * largest)
         .collect();
-    svd.u.map_or_else(
-        || DMatrix::zeros(matrix.nrows(), 0),
-        |u| u.select_columns(&kept),
-    )
+    svd.left.select_columns(&kept)
 }
 
 #[cfg(test)]

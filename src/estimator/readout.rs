@@ -1,7 +1,7 @@
 //! From features to parameters: the network, and what stands around it.
 
 use crate::estimator::budget::BUDGET;
-use crate::math::{MathError, Whitening, quantile, to_array, to_matrix};
+use crate::math::{MathError, Whitening, nearest, quantile, to_array, to_matrix};
 use crate::network::{Network, NetworkError};
 use crate::twin::ParameterSpace;
 use ndarray::{Array1, Array2, Axis, aview1, concatenate};
@@ -117,7 +117,7 @@ impl Standardiser {
     /// z of features (rows: samples).
     pub fn apply(&self, features: &Array2<f64>) -> Array2<f64> {
         let mut z = (features - &aview1(&self.mean)).dot(&self.matrix);
-        z.mapv_inplace(|v| v.clamp(-self.limit, self.limit));
+        z.mapv_inplace(|v| nearest(v, -self.limit, self.limit));
         z
     }
 }

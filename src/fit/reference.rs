@@ -12,6 +12,7 @@
 
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
+use crate::math::nearest;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// A direction that θ imitates up to this share of its square is no direction of its own.
@@ -208,7 +209,7 @@ impl Reference {
         }
         let with_theta = self.directions.tr_mul(direction);
         let score = self.r.dot(direction) - with_theta.dot(&self.answer);
-        let alpha = (score / own).clamp(low, high);
+        let alpha = nearest(score / own, low, high);
         Gain {
             nats: (alpha * score - 0.5 * alpha * alpha * own).max(0.0),
             alpha,

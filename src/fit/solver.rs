@@ -12,7 +12,7 @@
 //!
 //! Source: Nocedal & Wright, *Numerical Optimization*, second edition, sections 10.3 and 16.7.
 
-use crate::math::MathError;
+use crate::math::{MathError, nearest};
 use argmin::core::{
     Executor, IterState, KV, Problem, Solver as ArgminSolver, State, TerminationReason,
     TerminationStatus,
@@ -128,7 +128,7 @@ impl Solver<'_> {
 
     /// Nearest point within the bounds.
     fn clamp(&self, x: &DVector<f64>) -> DVector<f64> {
-        DVector::from_fn(x.len(), |j, _| x[j].clamp(self.lower[j], self.upper[j]))
+        DVector::from_fn(x.len(), |j, _| nearest(x[j], self.lower[j], self.upper[j]))
     }
 
     /// The damped step, entries held at their bounds left out; `None` where none is free, or their matrix is singular.

@@ -1,4 +1,5 @@
 use super::MathError;
+use super::nearest;
 use nalgebra::{DMatrix, DVector};
 
 /// Where to evaluate a function of θ for its Jacobian, and how to put the values together.
@@ -67,8 +68,8 @@ impl Stencil {
                 } else {
                     (at - low, -1.0)
                 };
-                let near = (at + sign * step.min(room / 2.0)).clamp(low, high);
-                let far = (near + (near - at)).clamp(low, high);
+                let near = nearest(at + sign * step.min(room / 2.0), low, high);
+                let far = nearest(near + (near - at), low, high);
                 let (a, b) = (near - at, far - at);
                 if a == 0.0 || a == b {
                     return Err(no_room);

@@ -23,7 +23,7 @@ pub(crate) use difference::Stencil;
 pub use error::MathError;
 pub(crate) use lagged::{Lagged, LaggedSignals};
 pub(crate) use least_squares::{LeastSquares, Regression, Regressors};
-pub(crate) use number::{Condition, LANES, Lanes, Mask, Number};
+pub(crate) use number::{Condition, LANES, Lanes, Mask, Number, nearest};
 pub(crate) use statistics::{
     CONSTANT, clopper_pearson, correlation, deviation, ends, is_constant, largest, median,
     quantile, rank_p_value, six_digits, three_digits,

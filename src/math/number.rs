@@ -4,6 +4,14 @@
 
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
+/// The point of `[low, high]` nearest to `value`; NaN stays NaN. Ends that data have put out of order give the higher one, where
+/// `f64::clamp` panics.
+#[inline]
+pub(crate) fn nearest(value: f64, low: f64, high: f64) -> f64 {
+    let value = if value < low { low } else { value };
+    if value > high { high } else { value }
+}
+
 /// A number of each of several computations. These never branch apart: where one needs a case, all compute it, and a [`Condition`]
 /// selects. (The traits of num-traits ask for an order and for whole parts, which lanes do not have.)
 pub(crate) trait Number:

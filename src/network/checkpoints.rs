@@ -2,7 +2,8 @@
 
 use super::adam::{Adam, AdamMoments};
 use super::{History, NamedTensor, NetworkError, bytes_of, values_of};
-use crate::storage::files::{replace, sha256, with_remedy};
+use crate::storage::checksum::sha256;
+use crate::storage::files::{replace, with_remedy};
 use crate::storage::untrusted::read_kept;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};

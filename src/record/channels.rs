@@ -71,12 +71,63 @@ pub(super) fn columns(inputs: usize, outputs: usize) -> Vec<String> {
     [time, column_names("u", inputs), column_names("y", outputs)].concat()
 }
 
+/// Columns of a file that the reader of a twin's records takes for its inputs, and its outputs if `outputs`: those with the usual names,
+/// unless one of them is another channel's own name. Then each channel has its own name, or `u01`, `y002` where that tells it not apart.
+pub(super) fn header(signals: &Signals, outputs: bool) -> Vec<String> {
+    let shown = if outputs { signals.outputs.len() } else { 0 };
+    let usual = columns(signals.inputs.len(), shown);
+    let is_read = |column: &str, name: &str| {
+        let found = usual_name(column, Some(signals));
+        found.as_deref() == Some(name) && column.trim() == column && !column.contains(['\r', '\n'])
+    };
+    if usual.iter().all(|name| is_read(name, name)) {
+        return usual;
+    }
+    let channels = signals.inputs.iter().chain(&signals.outputs);
+    let own = channels.map(|channel| channel.name.clone());
+    let own = std::iter::once("t".to_owned()).chain(own);
+    (usual.iter().zip(own))
+        .map(|(name, own)| {
+            let aliases = (0..).map(|zeros| match name.as_str() {
+                "t" => name.clone(),
+                "u" | "y" => format!("{name}{}1", "0".repeat(zeros)),
+                name => format!("{}{}{}", &name[..1], "0".repeat(zeros), &name[1..]),
+            });
+            let mut names = [own, name.clone()].into_iter().chain(aliases);
+            // As many aliases as there are channels cannot all be names of others.
+            let found = names.find(|column| is_read(column, name));
+            found.unwrap_or_else(|| name.clone())
+        })
+        .collect()
+}
+
 /// Columns of files that do not have the usual names: name in the twin → column in the file.
 ///
 /// Names in the twin are `t`, its inputs and outputs, or `u`, `u1`, `y`, `y1` and so on.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
+#[serde(
+    try_from = "BTreeMap<String, String>",
+    into = "BTreeMap<String, String>"
+)]
 pub struct Columns(BTreeMap<String, String>);
+
+impl From<Columns> for BTreeMap<String, String> {
+    fn from(columns: Columns) -> Self {
+        columns.0
+    }
+}
+
+impl TryFrom<BTreeMap<String, String>> for Columns {
+    type Error = &'static str;
+
+    fn try_from(columns: BTreeMap<String, String>) -> Result<Self, Self::Error> {
+        // A date reads as a table of one key of the parser's own.
+        match columns.keys().any(|key| key.starts_with('$')) {
+            true => Err("found a date, expected a table of columns, such as t = \"time\""),
+            false => Ok(Self(columns)),
+        }
+    }
+}
 
 impl Columns {
     /// Returns `true` if all columns have their usual names.
@@ -106,7 +157,7 @@ impl Columns {
             .filter_map(|name| name.chars().next())
             .collect();
         let is_given = |letter: char| letters.contains(&letter);
-        (header.iter().zip(given).enumerate())
+        let names = (header.iter().zip(given).enumerate())
             .map(|(at, (column, given))| {
                 if self.0.values().any(|asked| asked == column) && header[..at].contains(column) {
                     return Err(format!(
@@ -122,7 +173,11 @@ impl Columns {
                 let is_other = !is_usual(&usual) || is_replaced;
                 Ok((self.is_empty() || !is_other).then_some(usual))
             })
-            .collect()
+            .collect::<Result<Vec<_>, String>>()?;
+        match signals.and_then(|signals| ambiguous(header, &names, signals)) {
+            Some(problem) => Err(problem),
+            None => Ok(names),
+        }
     }
 
     /// Returns the usual name of each column that is given here.
@@ -217,15 +272,60 @@ pub(super) fn is_usual(name: &str) -> bool {
     name == "t" || channel.is_some_and(|rest| rest.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// Returns the usual name behind a name in the twin.
+/// Returns the usual name behind a name in the twin: that of the channel with this very name, else of the one that `u`, `u1`, `u01`, `y`, … stands
+/// for. A name of two channels stands for none.
 fn usual_name(name: &str, signals: Option<&Signals>) -> Option<String> {
-    let of = |letter: &str, channels: &[Quantity]| {
+    let usual = is_usual(name).then(|| name.to_owned());
+    let Some(signals) = signals.filter(|_| name != "t") else {
+        return usual;
+    };
+    let sides = [("u", &signals.inputs), ("y", &signals.outputs)];
+    let of = |(letter, channels): (&str, &Vec<Quantity>)| {
         let at = channels.iter().position(|channel| channel.name == name)?;
         Some(column_names(letter, channels.len()).swap_remove(at))
     };
-    let own = signals.and_then(|s| of("u", &s.inputs).or_else(|| of("y", &s.outputs)));
-    own.filter(|_| name != "t")
-        .or_else(|| is_usual(name).then(|| name.to_owned()))
+    match sides.map(of) {
+        [Some(_), Some(_)] => return None,
+        [Some(own), None] | [None, Some(own)] => return Some(own),
+        [None, None] => {}
+    }
+    let (letter, channels) = sides.into_iter().find(|side| name.starts_with(side.0))?;
+    let number = name[1..].parse::<usize>();
+    let numbered = |number: usize| {
+        column_names(letter, channels.len())
+            .get(number.wrapping_sub(1))
+            .cloned()
+    };
+    // Another number is out of order, which the reader says.
+    usual.map(|usual| number.ok().and_then(numbered).unwrap_or(usual))
+}
+
+/// Returns the two columns of a header that are one channel of the twin, under different names; or one that is two channels.
+fn ambiguous(header: &[&str], names: &[Option<String>], signals: &Signals) -> Option<String> {
+    let has = |channels: &[Quantity], name: &str| channels.iter().any(|c| c.name == name);
+    for (at, (column, name)) in header.iter().zip(names).enumerate() {
+        if has(&signals.inputs, column) && has(&signals.outputs, column) && name.is_some() {
+            return Some(format!(
+                "column \"{0}\" is the name of an input and of an output; name the columns {1}",
+                quoted(column),
+                excerpt(&self::header(signals, true).join(", "))
+            ));
+        }
+        let same = |(other, its): (&&str, &Option<String>)| its == name && other != column;
+        let before = header[..at].iter().zip(names);
+        if let Some((other, _)) = before
+            .into_iter()
+            .find(|pair| same(*pair) && name.is_some())
+        {
+            return Some(format!(
+                "columns \"{}\" and \"{}\" are one channel of the twin; name each by its own name, {}",
+                quoted(other),
+                quoted(column),
+                excerpt(&self::header(signals, true).join(", "))
+            ));
+        }
+    }
+    None
 }
 
 /// The error of a name that is not the twin's.
@@ -271,6 +371,89 @@ mod tests {
         assert_eq!(names("", "t,u,note").unwrap(), ["t", "u", "note"]);
         assert_eq!(names("lower=a", "t,a").unwrap(), ["t", "y2"]);
         assert_eq!(names("lower=a,upper=b", "t,a").unwrap(), ["t", "y2"]);
+    }
+
+    /// Whatever the channels are called, the reader takes the columns of the header for the channels that they are written from.
+    #[test]
+    fn a_header_is_read_as_it_was_written() {
+        let pool = [
+            "u", "u0", "u1", "u2", "u3", "u01", "y", "y0", "y1", "y2", "y3", "y01", "t", "a", "b",
+            "a,b", " a", "",
+        ];
+        let mut state = 1_u64;
+        let mut below = |n: usize| {
+            state = (state.wrapping_mul(6_364_136_223_846_793_005))
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % n
+        };
+        let mut own = 0;
+        for trial in 0..500 {
+            let mut drawn = |count: usize| {
+                let mut names: Vec<&str> = vec![];
+                while names.len() < count {
+                    let name = pool[below(pool.len())];
+                    if !names.contains(&name) {
+                        names.push(name);
+                    }
+                }
+                names
+                    .into_iter()
+                    .map(|name| Quantity::new(name, ""))
+                    .collect()
+            };
+            let signals = Signals {
+                inputs: drawn(trial % 4),
+                outputs: drawn(1 + trial % 5),
+            };
+            for outputs in [true, false] {
+                let written = header(&signals, outputs);
+                let shown = if outputs { signals.outputs.len() } else { 0 };
+                let expected = columns(signals.inputs.len(), shown);
+                own += usize::from(written != expected);
+                let columns: Vec<&str> = written.iter().map(String::as_str).collect();
+                let read = Columns::default().usual_names(&columns, Some(&signals));
+                let read: Vec<String> = read.unwrap().into_iter().flatten().collect();
+                assert_eq!(read, expected, "{signals:?}: {written:?}");
+            }
+        }
+        assert!(own > 100, "only {own} headers need names of their own");
+    }
+
+    #[test]
+    fn a_name_of_a_channel_is_that_channel_alone() {
+        let quantities =
+            |names: &[&str]| names.iter().map(|name| Quantity::new(name, "")).collect();
+        let read = |inputs: &[&str], outputs: &[&str], header: &[&str]| {
+            let signals = Signals {
+                inputs: quantities(inputs),
+                outputs: quantities(outputs),
+            };
+            let names = Columns::default().usual_names(header, Some(&signals))?;
+            Ok::<_, String>(names.into_iter().flatten().collect::<Vec<_>>())
+        };
+        let swapped = read(&["u"], &["y2", "y1"], &["t", "u", "y1", "y2"]).unwrap();
+        assert_eq!(swapped, ["t", "u", "y2", "y1"]);
+        let from_zero = read(&[], &["y0", "y1"], &["t", "y0", "y1"]).unwrap();
+        assert_eq!(from_zero, ["t", "y1", "y2"]);
+        let twice = read(&[], &["y0", "y1"], &["t", "y1", "y2"]).unwrap_err();
+        assert!(
+            twice.contains("\"y1\" and \"y2\" are one channel"),
+            "{twice}"
+        );
+        let both = read(&["y"], &["y"], &["t", "u", "y"]).unwrap_err();
+        assert!(both.contains("an input and of an output"), "{both}");
+    }
+
+    #[test]
+    fn a_date_is_no_table_of_columns() {
+        #[derive(Debug, Deserialize)]
+        struct File {
+            columns: Columns,
+        }
+        let read = |text: &str| toml::from_str::<File>(text).map(|file| file.columns);
+        assert!(!read("columns = { t = 'time' }").unwrap().is_empty());
+        let date = read("columns = 1979-05-27T07:32:00Z").unwrap_err();
+        assert!(date.to_string().contains("expected a table"), "{date}");
     }
 
     #[test]

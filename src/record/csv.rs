@@ -4,12 +4,14 @@
 //! names by [`Columns`]. Columns are separated by commas, semicolons or tabs. An output that was not measured is an empty cell, `nan` or
 //! `NA`; its column may be left out where the twin is known. Steps that are the same to 1e-3 count as one. Rows of one time are replicates. Rows are counted as an editor counts lines: the header is row 1.
 
-use super::channels::{Columns, columns};
+use super::channels::{Columns, columns, header};
 use super::parquet;
 use super::table::Table;
 use super::text::Text;
 use crate::record::{Drive, Record, RecordError, Signal, Signals};
 use crate::storage::files::write_new;
+use crate::storage::reading::Reading;
+use std::borrow::Cow;
 use std::path::Path;
 
 impl Record {
@@ -104,26 +106,34 @@ impl RecordReader {
             });
         }
         let wrong = |error| RecordError::io(path, error);
-        let file = std::fs::File::open(path).map_err(wrong)?;
+        let file = Reading::open(path).map_err(wrong)?;
         let text = Text::open(file).map_err(wrong)?;
         let text = text.map_err(|problem| RecordError::file(path, problem))?;
         Table::parse(text, path, columns, signals, read)
     }
 }
 
-/// The text of an input file, as [`Drive::read`] reads it.
-pub(crate) fn drive_csv_text(drive: &Drive) -> String {
-    csv_text(drive, &Signal::zeros((drive.samples(), 0)))
+/// The text of an input file for a twin with these channels.
+pub(crate) fn drive_csv_text(drive: &Drive, signals: &Signals) -> String {
+    let outputs = Signal::zeros((drive.samples(), 0));
+    csv_text(&header(signals, false), drive, &outputs)
 }
 
 /// The text of a record file; reading it gives the same bits of u and y, and of t where steps vary. A missing output is an empty cell.
 pub(crate) fn record_csv_text(record: &Record) -> String {
-    csv_text(record.drive(), record.outputs())
+    let (inputs, outputs) = (record.drive().inputs(), record.outputs());
+    let header = columns(inputs.ncols(), outputs.ncols());
+    csv_text(&header, record.drive(), outputs)
 }
 
-fn csv_text(drive: &Drive, outputs: &Signal) -> String {
-    let header = columns(drive.inputs().ncols(), outputs.ncols());
-    let mut text = header.join(",") + "\n";
+/// As [`record_csv_text`], for a twin with these channels: its reader tells them apart.
+pub(crate) fn twin_csv_text(record: &Record, signals: &Signals) -> String {
+    csv_text(&header(signals, true), record.drive(), record.outputs())
+}
+
+fn csv_text(header: &[String], drive: &Drive, outputs: &Signal) -> String {
+    let cells: Vec<_> = header.iter().map(|name| cell(name)).collect();
+    let mut text = cells.join(",") + "\n";
     for k in 0..drive.samples() {
         let t = match drive.is_uniform() {
             true => rounded_time(drive.own_time(k), drive.dt()),
@@ -141,6 +151,14 @@ fn csv_text(drive: &Drive, outputs: &Signal) -> String {
     text
 }
 
+/// A name as a cell.
+fn cell(name: &str) -> Cow<'_, str> {
+    match name.contains([',', ';', '\t', '"']) {
+        true => format!("\"{}\"", name.replace('"', "\"\"")).into(),
+        false => name.into(),
+    }
+}
+
 impl Record {
     /// Writes a new CSV file, which appears whole or not at all.
     ///
@@ -149,6 +167,12 @@ impl Record {
     /// The file exists, or cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), RecordError> {
         write_new(path, record_csv_text(self).as_bytes())
+            .map_err(|error| RecordError::io(path, error))
+    }
+
+    /// As [`write`](Self::write), for a twin with these channels: its reader tells them apart.
+    pub(crate) fn write_for(&self, path: &Path, signals: &Signals) -> Result<(), RecordError> {
+        write_new(path, twin_csv_text(self, signals).as_bytes())
             .map_err(|error| RecordError::io(path, error))
     }
 }
@@ -339,13 +363,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("u.csv");
         let inputs = Signal::from_shape_fn((4, 2), |(k, j)| k as f64 / (j as f64 + 3.0));
-        for (drive, header) in [
+        for (drive, begin) in [
             (Drive::new(0.1, inputs).unwrap(), "t,u1,u2\n"),
             (Drive::new(0.1, Signal::ones((3, 1))).unwrap(), "t,u\n"),
             (Drive::autonomous(0.5, 3).unwrap(), "t\n0\n0.5\n1\n"),
         ] {
-            let text = drive_csv_text(&drive);
-            assert!(text.starts_with(header), "{text}");
+            let header = columns(drive.inputs().ncols(), 0);
+            let none = Signal::zeros((drive.samples(), 0));
+            let text = csv_text(&header, &drive, &none);
+            assert!(text.starts_with(begin), "{text}");
             std::fs::write(&path, text).unwrap();
             let back = Drive::read(&path).unwrap();
             assert_eq!(back.inputs(), drive.inputs());

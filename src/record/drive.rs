@@ -142,7 +142,7 @@ impl Drive {
 
     /// The first samples, at least one of them.
     pub(crate) fn first(&self, samples: usize) -> Self {
-        let rows = samples.clamp(1, self.samples());
+        let rows = samples.max(1).min(self.samples());
         Self {
             dt: self.dt,
             first_time: self.first_time,

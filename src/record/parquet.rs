@@ -22,14 +22,16 @@ pub(super) fn with_rows<T>(
     path: &Path,
     read: impl FnOnce(&mut dyn Read) -> Result<T, RecordError>,
 ) -> Result<T, RecordError> {
+    use crate::storage::reading::{note_whole, open};
     use parquet::file::reader::{FileReader, SerializedFileReader};
 
-    let file = std::fs::File::open(path).map_err(|error| RecordError::io(path, error))?;
+    let unread = |error| RecordError::io(path, error);
+    let file = open(path).map_err(unread)?;
     let wrong = |error: parquet::errors::ParquetError| {
         let remedy = "a record has columns of numbers, snappy or not compressed";
         RecordError::file(path, format!("{error}; {remedy}"))
     };
-    let reader = SerializedFileReader::new(file).map_err(wrong)?;
+    let reader = SerializedFileReader::new(file.try_clone().map_err(unread)?).map_err(wrong)?;
     let schema = reader.metadata().file_metadata().schema_descr();
     let names: Vec<String> = (schema.columns().iter())
         .map(|column| format!("\"{}\"", column.name().replace('"', "\"\"")))
@@ -43,10 +45,11 @@ pub(super) fn with_rows<T>(
         error: None,
     };
     let outcome = read(&mut text);
-    match text.error {
-        Some(error) => Err(wrong(error)),
-        None => outcome,
+    if let Some(error) = text.error {
+        return Err(wrong(error));
     }
+    note_whole(path, &file).map_err(unread)?;
+    outcome
 }
 
 /// Rows as text, made when they are read.

@@ -19,7 +19,7 @@ impl Stamp {
     /// a nanosecond are cut off.
     pub fn parse(text: &str) -> Option<Self> {
         // Without its signs a date is a number.
-        if text.get(4..5) != Some("-") {
+        if text.get(4..5) != Some("-") || !has_whole_zone(text) {
             return None;
         }
         let text = without_surplus_digits(text);
@@ -54,6 +54,13 @@ impl Stamp {
         let signs = |c: char| matches!(c, ':' | '/' | '-' | '.' | ' ' | 'T');
         digits > 2 && text.chars().filter(|c| signs(*c)).count() > 1
     }
+}
+
+/// Returns `false` for a zone without hours, such as `+:01`, which the parser takes.
+fn has_whole_zone(text: &str) -> bool {
+    let sign = text.rfind(['+', '-']).map_or(text.len(), |at| at + 1);
+    // The sign before a day is followed by one, too.
+    text[sign..].bytes().take(2).all(|b| b.is_ascii_digit())
 }
 
 /// Cuts the fraction of a second to nanoseconds, which the parser asks for.
@@ -122,6 +129,7 @@ mod tests {
             "2024-01-01T12:60",
             "2024-01-01T12:00:00.",
             "2024-01-01T12:00:00+1",
+            "2024-01-01T12:00:00+:01",
             "2024-01-01T12:00:00+26:00",
             "20240101",
             "2024-01-01Z",

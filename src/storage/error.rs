@@ -18,6 +18,34 @@ pub enum StorageError {
     /// An output in a folder that does not exist.
     #[error("{}: the folder {} does not exist; make it first", .0.display(), folder(.0).display())]
     NoParent(PathBuf),
+    /// An output path that is a link to nothing.
+    #[error("{} is a link to {}, which does not exist; remove it, or choose another place", path.display(), to.display())]
+    Dangling {
+        /// Output.
+        path: PathBuf,
+        /// Where the link leads.
+        to: PathBuf,
+    },
+    /// An output path that names a folder where a file is written.
+    #[error("{} names a folder, the output is a file; name a file", .0.display())]
+    NoFile(PathBuf),
+    /// An output path with a name of unfinished files.
+    #[error("{}: names that begin with .truetwin- are those of unfinished files; choose another name", .0.display())]
+    Reserved(PathBuf),
+    /// Something at the place of an unfinished folder that this program has not put there.
+    #[error("{} is in the way, and is no unfinished work of this program; remove it", .0.display())]
+    InTheWay(PathBuf),
+    /// A finished folder whose place was taken while it was made.
+    #[error("{} was taken while the work went on; the result is in {}", place.display(), kept.display())]
+    Kept {
+        /// Output.
+        place: PathBuf,
+        /// Where the folder is.
+        kept: PathBuf,
+    },
+    /// A path that a file keeps as text, which it is not.
+    #[error("{}: this path is kept in a file as text, and is no UTF-8; rename it", .0.display())]
+    NoText(PathBuf),
     /// An output path that holds something else.
     #[error(
         "{} exists already and is no {verb} folder ({reason}); choose another folder or remove it",
@@ -133,6 +161,8 @@ pub(crate) fn with_remedy(error: &io::Error) -> String {
             "make room, or choose another place"
         }
         io::ErrorKind::InvalidData => "save it as UTF-8 text",
+        io::ErrorKind::InvalidFilename => "choose a shorter name",
+        io::ErrorKind::NotSeekable => "save it as a file first",
         io::ErrorKind::Unsupported => "remove it, and put a file or folder of its own there",
         io::ErrorKind::FileTooLarge if error.raw_os_error().is_some() => {
             "raise the limit of file sizes (ulimit -f), or choose another place"

@@ -2,12 +2,8 @@
 
 pub(crate) use super::error::{folder, with_remedy};
 use super::unfinished::file_beside;
-use sha2::{Digest, Sha256};
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, Write};
 use std::path::Path;
-
-/// Bytes of a file that are hashed at once.
-const PIECE: usize = 1 << 16;
 
 /// Writes a new file.
 pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -28,27 +24,6 @@ fn filled(path: &Path, bytes: &[u8]) -> io::Result<tempfile::NamedTempFile> {
     file.as_file().write_all(bytes)?;
     file.as_file().sync_all()?;
     Ok(file)
-}
-
-/// Returns the SHA-256 of bytes, in hexadecimal digits.
-pub(crate) fn sha256(bytes: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(bytes))
-}
-
-/// Returns the SHA-256 of a file, without reading it into memory.
-pub(crate) fn sha256_of(path: &Path) -> io::Result<String> {
-    let mut hash = Sha256::new();
-    let mut file = BufReader::with_capacity(PIECE, std::fs::File::open(path)?);
-    while let piece @ [_, ..] = file.fill_buf()? {
-        hash.update(piece);
-        let length = piece.len();
-        file.consume(length);
-    }
-    Ok(hexadecimal(&hash.finalize()))
-}
-
-fn hexadecimal(digest: &[u8]) -> String {
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -5,14 +5,20 @@
 //! | write a file that appears complete or not at all | `files` |
 //! | write a folder likewise, remove leftovers of killed processes | `unfinished` |
 //! | read files of others, within limits | `untrusted` |
+//! | know the checksum of what was read | `reading` |
+//! | check the place of an output before the work | `place` |
 //! | keep pieces of long work in a folder, share it among jobs and ranks | `work` |
 
+pub(crate) mod checksum;
 mod error;
 pub(crate) mod files;
 pub(crate) mod fuzzing;
+mod names;
+pub(crate) mod place;
+pub(crate) mod reading;
 mod unfinished;
 pub(crate) mod untrusted;
 pub(crate) mod work;
 
 pub use error::StorageError;
-pub(crate) use unfinished::{NewFolder, sweep_beside};
+pub(crate) use unfinished::{NewFolder, remove_unfinished, sweep_beside};

@@ -1,18 +1,33 @@
 //! Files and folders that are not in their place yet, and the removal of those that a killed process left behind.
 //!
-//! An unfinished file or folder is called `.truetwin-…`. Its writer holds a lock on it, which the system releases when the
-//! process ends. Whatever can be locked is therefore abandoned. A writer checks after locking that nobody has removed its
-//! file in between, so that no writer loses a file. On file systems without locks nothing is removed.
+//! An unfinished file or folder is called `.truetwin-unfinished-PROCESS-RANDOM`, one that a single process may have
+//! `.truetwin-unfinished-CHECKSUM`, by the name of its place. Its writer holds a lock on it, which the system releases when the
+//! process ends. What has such a name and can be locked is therefore abandoned; other names are a user's. A writer checks after
+//! locking that nobody has removed its file in between, so that no writer loses a file. On file systems without locks nothing is removed.
 
 use super::StorageError;
 use super::error::folder;
+use super::names::{is_unfinished, named, prefix};
+use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-/// Start of the names of unfinished files and folders.
-const PREFIX: &str = ".truetwin-";
+/// Unfinished folders of this process, which are removed where it ends without unwinding.
+static MADE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn made_here() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    MADE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the unfinished folders of this process, which ends now.
+pub(crate) fn remove_unfinished() {
+    for path in made_here().iter() {
+        let _ = fs::remove_dir_all(path);
+    }
+}
 
 /// Creates a locked temporary file beside `path`.
 pub(super) fn file_beside(path: &Path) -> io::Result<NamedTempFile> {
@@ -23,8 +38,10 @@ pub(super) fn file_beside(path: &Path) -> io::Result<NamedTempFile> {
         // As any new file: the user's mask decides who may read it.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
+    let prefix = prefix();
+    builder.prefix(&prefix);
     loop {
-        let file = builder.prefix(PREFIX).tempfile_in(folder(path));
+        let file = builder.tempfile_in(folder(path));
         let file = file.map_err(without_path)?;
         if holds(file.as_file(), file.path()) {
             return Ok(file);
@@ -68,7 +85,7 @@ pub(super) fn sweep(place: &Path) {
         return;
     };
     for entry in entries.flatten() {
-        if entry.file_name().to_string_lossy().starts_with(PREFIX) {
+        if entry.file_name().to_str().is_some_and(is_unfinished) {
             remove_abandoned(&entry.path());
         }
     }
@@ -102,21 +119,63 @@ fn remove_abandoned(path: &Path) {
 pub(super) fn remove(place: &Path) -> io::Result<()> {
     let gone = named(place);
     fs::rename(place, &gone)?;
-    match fs::remove_dir_all(&gone) {
+    match fs::remove_dir_all(&gone).or_else(|_| remove_one_by_one(&gone)) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),
     }
 }
 
-fn named(place: &Path) -> PathBuf {
-    let name = place.file_name().unwrap_or_default().to_string_lossy();
-    place.with_file_name(format!("{PREFIX}{name}"))
+/// Removes a folder with one open file at a time, where the system allows no more.
+fn remove_one_by_one(folder: &Path) -> io::Result<()> {
+    let mut folders = vec![folder.to_owned()];
+    let mut next = 0;
+    while let Some(folder) = folders.get(next).cloned() {
+        let entries: Vec<_> = fs::read_dir(&folder)?.collect::<io::Result<_>>()?;
+        for entry in entries {
+            match entry.file_type()?.is_dir() {
+                true => folders.push(entry.path()),
+                false => fs::remove_file(entry.path())?,
+            }
+        }
+        next += 1;
+    }
+    folders.iter().rev().try_for_each(fs::remove_dir)
+}
+
+/// The error of a folder for `place` that one process may have, where its name is taken.
+fn taken(place: &Path) -> StorageError {
+    let path = named(place);
+    let is_folder = path.symlink_metadata().is_ok_and(|data| data.is_dir());
+    match is_folder {
+        true => StorageError::Busy(place.into()),
+        false => StorageError::InTheWay(path),
+    }
+}
+
+/// An entry among the unfinished folders of this process.
+#[derive(Debug)]
+struct UnfinishedEntry(PathBuf);
+
+impl UnfinishedEntry {
+    fn new(path: &Path) -> Self {
+        made_here().insert(path.into());
+        Self(path.into())
+    }
+}
+
+impl Drop for UnfinishedEntry {
+    fn drop(&mut self) {
+        made_here().remove(&self.0);
+    }
 }
 
 /// A folder that is filled beside its place and appears there complete.
 #[derive(Debug)]
 pub(crate) struct NewFolder {
     place: PathBuf,
+    /// `true` where no other process may fill the place.
+    is_claimed: bool,
+    _listed: UnfinishedEntry,
     filling: TempDir,
     /// Its lock keeps sweeps away.
     _open: Option<File>,
@@ -125,26 +184,28 @@ pub(crate) struct NewFolder {
 impl NewFolder {
     /// Creates a folder for `place`. Several processes may do so at once; the first to finish wins.
     pub fn new(place: &Path) -> Result<Self, StorageError> {
-        Self::made(place, Builder::new().prefix(PREFIX))
+        Self::made(place, false, Builder::new().prefix(&prefix()))
     }
 
     /// Creates the folder for `place` that one process at a time may have.
     pub fn claim(place: &Path) -> Result<Self, StorageError> {
         let path = named(place);
         let name = path.file_name().unwrap_or_default();
-        Self::made(place, Builder::new().prefix(name).rand_bytes(0))
+        Self::made(place, true, Builder::new().prefix(name).rand_bytes(0))
     }
 
-    fn made(place: &Path, name: &Builder<'_, '_>) -> Result<Self, StorageError> {
+    fn made(place: &Path, is_claimed: bool, name: &Builder<'_, '_>) -> Result<Self, StorageError> {
+        // `out/.` is `out`.
+        let place: &Path = &place.components().collect::<PathBuf>();
         loop {
             sweep_beside(place);
             let filling = name.tempdir_in(folder(place));
             let filling = filling.map_err(|error| match error.kind() {
-                io::ErrorKind::AlreadyExists => StorageError::Busy(place.into()),
+                io::ErrorKind::AlreadyExists => taken(place),
                 _ => StorageError::io(place, without_path(error)),
             })?;
             if let Some(new) = Self::locked(place, filling) {
-                return Ok(new);
+                return Ok(Self { is_claimed, ..new });
             }
         }
     }
@@ -162,6 +223,8 @@ impl NewFolder {
         }
         Some(Self {
             place: place.into(),
+            is_claimed: false,
+            _listed: UnfinishedEntry::new(filling.path()),
             filling,
             _open: open,
         })
@@ -178,7 +241,7 @@ impl NewFolder {
             .map_err(|error| StorageError::io(&self.place.join(name), error))
     }
 
-    /// Moves the folder to its place.
+    /// Moves the folder to its place. One that was claimed is kept beside a place that was taken meanwhile.
     pub fn finish(self) -> Result<(), StorageError> {
         let failed = |error| StorageError::io(&self.place, error);
         #[cfg(unix)]
@@ -188,10 +251,32 @@ impl NewFolder {
             let mode = fs::Permissions::from_mode(0o755);
             fs::set_permissions(self.filling.path(), mode).map_err(failed)?;
         }
-        fs::rename(self.filling.path(), &self.place).map_err(failed)?;
+        let moved = match fs::rename(self.filling.path(), &self.place) {
+            Err(error) if self.is_claimed => self.kept_beside().ok_or(error).map(Some),
+            moved => moved.map(|()| None),
+        };
+        let kept = moved.map_err(failed)?;
         // Moved away: nothing is left to remove.
         let _ = self.filling.keep();
-        Ok(())
+        match kept {
+            None => Ok(()),
+            Some(kept) => {
+                let place = self.place;
+                Err(StorageError::Kept { place, kept })
+            }
+        }
+    }
+
+    /// Moves the folder to the first free of `out-2`, `out-3`, …
+    fn kept_beside(&self) -> Option<PathBuf> {
+        let numbered = |number: usize| {
+            let mut name = self.place.file_name()?.to_owned();
+            name.push(format!("-{number}"));
+            Some(self.place.with_file_name(name))
+        };
+        (2..100).filter_map(numbered).find(|path| {
+            path.symlink_metadata().is_err() && fs::rename(self.filling.path(), path).is_ok()
+        })
     }
 }
 
@@ -249,16 +334,73 @@ mod tests {
     fn leftovers_of_the_dead_are_swept_and_the_work_of_the_living_is_not() {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
-        fs::create_dir_all(at(".truetwin-old/part")).unwrap();
-        fs::write(at(".truetwin-abc"), "half").unwrap();
+        let old = named(&at("old"));
+        fs::create_dir_all(old.join("part")).unwrap();
+        fs::write(at(".truetwin-unfinished-4711-a1B2c3"), "half").unwrap();
         fs::write(at("user.txt"), "mine").unwrap();
-        std::os::unix::fs::symlink(at("user.txt"), at(".truetwin-link")).unwrap();
+        let link = ".truetwin-unfinished-0123456789abcdef";
+        std::os::unix::fs::symlink(at("user.txt"), at(link)).unwrap();
         let folder = NewFolder::new(&at("out")).unwrap();
         let file = file_beside(&at("out.txt")).unwrap();
         sweep(place.path());
         assert!(folder.file("").exists() && file.path().exists());
         drop((folder, file));
-        assert_eq!(names(place.path()), [".truetwin-link", "user.txt"]);
+        assert_eq!(names(place.path()), [link, "user.txt"]);
+    }
+
+    /// A name that begins as ours do is a user's, unless it names a process or a place.
+    #[test]
+    fn files_of_users_are_not_swept() {
+        let place = tempfile::tempdir().unwrap();
+        let users = [
+            ".truetwin-cache",
+            ".truetwin-study.toml",
+            ".truetwin-unfinished",
+            ".truetwin-unfinished-4711",
+            ".truetwin-unfinished-mine-a1B2c3",
+            ".truetwin-unfinished-notes.txt",
+        ];
+        for name in users {
+            fs::write(place.path().join(name), "mine").unwrap();
+        }
+        NewFolder::new(&place.path().join("out")).unwrap();
+        assert_eq!(names(place.path()), users);
+    }
+
+    #[test]
+    fn a_folder_goes_one_by_one() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("work");
+        fs::create_dir_all(path.join("a/b")).unwrap();
+        fs::create_dir_all(path.join("c")).unwrap();
+        fs::write(path.join("a/b/x"), "x").unwrap();
+        fs::write(path.join("y"), "y").unwrap();
+        remove_one_by_one(&path).unwrap();
+        assert!(names(place.path()).is_empty());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_stands_in_the_way_is_named() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("out");
+        std::os::unix::fs::symlink("/nowhere", named(&path)).unwrap();
+        let error = NewFolder::claim(&path).unwrap_err();
+        assert!(matches!(error, StorageError::InTheWay(_)), "{error}");
+    }
+
+    /// A place that was taken meanwhile does not cost the result.
+    #[test]
+    fn a_finished_folder_is_kept_beside_a_taken_place() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("out");
+        let folder = NewFolder::claim(&path.join(".")).unwrap();
+        folder.write("a.txt", "a").unwrap();
+        fs::write(&path, "another's").unwrap();
+        let error = folder.finish().unwrap_err().to_string();
+        assert!(error.contains("out-2"), "{error}");
+        assert_eq!(names(place.path()), ["out", "out-2"]);
+        assert_eq!(fs::read(place.path().join("out-2/a.txt")).unwrap(), b"a");
     }
 
     /// Writers and sweepers at once: no writer loses its file.

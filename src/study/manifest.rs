@@ -3,7 +3,7 @@
 use super::{InputPlan, Study, StudyError};
 use crate::record::Signal;
 use crate::storage::StorageError;
-use crate::storage::files::sha256;
+use crate::storage::checksum::sha256;
 use crate::storage::work::{Manifest, checksum};
 use crate::twin::Noise;
 use serde_json::{Value, json};
@@ -19,8 +19,7 @@ impl Study {
         let manifest = Manifest::new(verb, layout)
             .with("twin", self.name())
             .with("parameters", parameters)
-            // A file that was read can be written.
-            .with("study", self.file().written().unwrap_or_default())
+            .with("study", self.written()?)
             .with("record", json!(self.plan().map(|p| (p.step, p.samples))));
         let manifest = match self.plan().and_then(|plan| plan.input.as_ref()) {
             Some(InputPlan::File(path)) => manifest.with("input file", checksum(path)?),
@@ -28,6 +27,17 @@ impl Study {
         };
         // Last: what else is different tells more.
         Ok(manifest.with("simulation", self.simulation()))
+    }
+
+    /// The text of the study file.
+    fn written(&self) -> Result<String, StorageError> {
+        match self.plan().and_then(|plan| plan.input.as_ref()) {
+            Some(InputPlan::File(path)) if path.to_str().is_none() => {
+                Err(StorageError::NoText(path.clone()))
+            }
+            // A file that was read can be written.
+            _ => Ok(self.file().written().unwrap_or_default()),
+        }
     }
 
     /// Checksum of a simulation at a point of the prior; of what is wrong with it, where it fails.

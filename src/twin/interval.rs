@@ -1,5 +1,6 @@
 //! A closed interval of real numbers.
 
+use crate::math::nearest;
 use crate::setting::number;
 use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
@@ -71,9 +72,7 @@ impl Interval {
     /// The nearest point inside.
     #[inline]
     pub fn clamp(self, value: f64) -> f64 {
-        // Two instructions: the ends are known to be in order.
-        let value = if value < self.low { self.low } else { value };
-        if value > self.high { self.high } else { value }
+        nearest(value, self.low, self.high)
     }
 }
 

@@ -6,6 +6,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
+/// Name of a file that a killed process has left.
+const LEFTOVER: &str = ".truetwin-unfinished-4711-a1B2c3";
 const TRUETWIN: &str = env!("CARGO_BIN_EXE_truetwin");
 
 fn run(folder: &Path, words: &str) -> Output {
@@ -213,6 +215,9 @@ fn limits_of_the_system_are_named() {
         &limited("-f 0", call),
         &["error: s.csv: File too large (os error 27); raise"],
     );
+    let call = "pretrain --twin van-der-pol --bank-size 500 --epochs 1 --out o";
+    let output = limited("-n 5", call);
+    assert!(leftovers(place.path()).is_empty(), "{output:?}");
     let call = "twins --threads 1024";
     let output = limited("-v 400000", call);
     one_line(call, &output, &["threads", "--threads", "ulimit -v"]);
@@ -226,14 +231,15 @@ fn leftovers_of_killed_runs_are_removed_by_the_next() {
     let bank = "bank --twin van-der-pol --size 64 --out bank";
     assert!(run(place.path(), bank).status.success());
     for part in [".", "bank", "bank/shards"] {
-        fs::write(place.path().join(part).join(".truetwin-a1b2c3"), "half").unwrap();
+        fs::write(place.path().join(part).join(LEFTOVER), "half").unwrap();
     }
-    fs::create_dir(place.path().join(".truetwin-gap")).unwrap();
+    let claimed = ".truetwin-unfinished-0123456789abcdef";
+    fs::create_dir(place.path().join(claimed)).unwrap();
     assert!(run(place.path(), bank).status.success());
     for part in [".", "bank", "bank/shards"] {
         assert!(leftovers(&place.path().join(part)).is_empty(), "{part}");
     }
-    fs::write(place.path().join(".truetwin-a1b2c3"), "half").unwrap();
+    fs::write(place.path().join(LEFTOVER), "half").unwrap();
     let call = "simulate --twin van-der-pol --theta nu=1 --out s.csv";
     assert!(run(place.path(), call).status.success());
     assert!(leftovers(place.path()).is_empty());
@@ -249,7 +255,7 @@ fn leftovers_in_a_folder_of_trials_are_removed_by_the_next_run() {
     assert!(run(place.path(), trials).status.success());
     let parts = [".", "trials", "trials/records", "trials/answers"];
     for part in parts {
-        fs::write(place.path().join(part).join(".truetwin-a1b2c3"), "half").unwrap();
+        fs::write(place.path().join(part).join(LEFTOVER), "half").unwrap();
     }
     let read = || fs::read(place.path().join("trials/scorecard.json")).unwrap();
     let before = read();
@@ -298,11 +304,36 @@ fn a_misspelt_word_is_met_with_the_right_one() {
     }
 }
 
+/// Options and keys that would be ignored are refused before the work.
+#[test]
+fn nothing_is_ignored_without_a_word() {
+    let place = with_record();
+    let study = "twin = 'van-der-pol'\n[noise]\ny = { std = 0.1, known = true, factor = 2 }\n";
+    fs::write(place.path().join("noise.toml"), study).unwrap();
+    for (call, parts) in [
+        (
+            "simulate --twin van-der-pol --theta nu=1 --columns y=level",
+            ["--columns", "give --input"],
+        ),
+        (
+            "check --twin van-der-pol --columns y=level",
+            ["--columns", "give a record"],
+        ),
+        (
+            "fit r.csv --study noise.toml",
+            ["noise.toml", "remove one of known and factor"],
+        ),
+    ] {
+        refused(place.path(), call, &parts);
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_second_run_on_one_output_is_refused() {
     let place = with_record();
-    let claimed = place.path().join(".truetwin-gap");
+    // By the SHA-256 of `gap`.
+    let claimed = place.path().join(".truetwin-unfinished-54d5dbf0124e59af");
     fs::create_dir(&claimed).unwrap();
     let lock = fs::File::open(&claimed).unwrap();
     lock.lock().unwrap();

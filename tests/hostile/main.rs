@@ -8,6 +8,9 @@ mod files;
 mod fuzz;
 mod list;
 mod memory;
+mod numbers;
+#[cfg(unix)]
+mod places;
 mod security;
 #[cfg(unix)]
 mod stop;

@@ -116,6 +116,40 @@ fn a_training_that_is_stopped_says_how_to_go_on() {
     );
 }
 
+/// Work that does not come to a next step is left; what is said is true, and nothing stays behind.
+#[test]
+fn a_fit_is_left_within_two_seconds() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    short(at);
+    let made = start(at, "simulate --study short.toml --theta nu=1 --out r.csv");
+    assert!(made.wait_with_output().unwrap().status.success());
+    let begun = Instant::now();
+    let later = || begun.elapsed() > Duration::from_millis(1500);
+    let call = "fit r.csv --study short.toml --draws 1000000 --out o";
+    let output = interrupted(at, call, "-TERM", later);
+    // Two seconds are documented; the rest is for a loaded machine.
+    assert!(begun.elapsed() < Duration::from_millis(1500 + 2000 + 2000));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert_eq!(said.trim(), "error: stopped; nothing was written");
+    assert_eq!(entries(at), 2, "the study and the record");
+}
+
+#[test]
+fn work_that_has_kept_nothing_yet_does_not_say_so() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let begun = Instant::now();
+    let soon = || begun.elapsed() > Duration::from_millis(300);
+    let call = "withheld --twin tanks --trials 100000 --out w";
+    let output = interrupted(at, call, "-INT", soon);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert_eq!(said.trim(), "error: stopped; nothing was written");
+    assert_eq!(entries(at), 0);
+}
+
 /// Moments in milliseconds up to `longest`, drawn once and for all; others with `TRUETWIN_MOMENTS=1`, 2, …
 fn moments(longest: u64) -> impl Iterator<Item = u64> {
     let others = std::env::var("TRUETWIN_MOMENTS").ok();

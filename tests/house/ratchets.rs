@@ -278,11 +278,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 160, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 55_540, lines),
-        Ratchet::new("files", 452, files.collect()),
+        Ratchet::new("lines of code", 56_700, lines),
+        Ratchet::new("files", 460, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 470, constants(sources)),
+        Ratchet::new("named numeric constants", 472, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             3,

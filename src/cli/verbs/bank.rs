@@ -37,6 +37,10 @@ impl Verb for Bank {
         true
     }
 
+    fn kept(&self) -> Option<PathBuf> {
+        Some(self.out.clone())
+    }
+
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let project = context.project(&self.subject)?;
         let plan = BankPlan {
@@ -64,7 +68,7 @@ impl Verb for Bank {
         let rate = made as f64 / seconds;
         let folder = self.out.display();
         let json = json!({
-            "schema": "truetwin.bank/1", "twin": project.study().name(), "folder": self.out,
+            "schema": "truetwin.bank/1", "twin": project.study().name(), "folder": output::name(&self.out),
             "size": self.size, "seed": context.seed,
             "shards": { "there": filled.there, "of": filled.of },
             "simulated": made, "simulations_per_second": rate, "seconds": seconds,

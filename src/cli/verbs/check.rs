@@ -28,6 +28,7 @@ pub(in crate::cli) struct Check {
 
 impl Verb for Check {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        self.columns.check_used(self.record.is_some(), "a record")?;
         let project = context.project(&self.subject)?;
         let study = project.study();
         if let Some(path) = &self.record {
@@ -76,7 +77,7 @@ impl Check {
             }
         }
         let json = json!({
-            "schema": "truetwin.suitability/1", "twin": study.name(), "record": path, "suits": result.suits(),
+            "schema": "truetwin.suitability/1", "twin": study.name(), "record": output::name(path), "suits": result.suits(),
             "findings": result.findings, "parameters": result.parameters,
         });
         let text = || check_document(study.name(), &result.findings).text();

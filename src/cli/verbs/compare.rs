@@ -34,8 +34,7 @@ impl Verb for Compare {
         let folder = output::asked_folder(&self.out)?;
         let mut compared = vec![];
         let mut shown = None;
-        for path in &self.studies {
-            let study = context.configured(path)?.study().clone();
+        for (path, study) in self.studies.iter().zip(self.configured(context)?) {
             let reader = self.columns.reader(&study);
             let (mut measured, validation) =
                 records::read(reader, &self.records, Some(&self.validation))?;
@@ -68,15 +67,39 @@ impl Verb for Compare {
             .files("study", &self.studies)
             .files("record", &self.records);
         let json = provenance.on(compare_json(&compared));
-        if let (Some(folder), Some(record)) = (folder, &shown) {
+        let write = || {
+            let Some((folder, record)) = folder.zip(shown.as_ref()) else {
+                return Ok(());
+            };
             folder.write("compare.json", format!("{json:#}"))?;
             folder.write("overlay.svg", compare_svg(&compared, record))?;
-            folder.finish()?;
-        }
+            Ok(folder.finish()?)
+        };
         let what = match self.records.is_empty() {
             true => "on the whole of the record whose first two thirds were fitted",
             false => "on the validation record",
         };
-        provenance.print(context, &json, || compare_document(&compared, what).text())
+        deliver(write, || {
+            provenance.print(context, &json, || compare_document(&compared, what).text())
+        })
+    }
+}
+
+impl Compare {
+    /// Returns the studies; refuses a program or FMU that none of them takes.
+    fn configured(&self, context: &Context<'_>) -> Result<Vec<Study>, Failure> {
+        let study = |path: &PathBuf| Ok(context.configured(path)?.study().clone());
+        let studies: Vec<Study> = self
+            .studies
+            .iter()
+            .map(study)
+            .collect::<Result<_, Failure>>()?;
+        let external = context.external.map(|project| project.study().name());
+        match external.filter(|name| studies.iter().all(|study| study.name() != *name)) {
+            Some(name) => Err(Failure::user(format!(
+                "none of the studies is of the twin {name}, which --program or --fmu starts; remove it, or add a study of that twin"
+            ))),
+            None => Ok(studies),
+        }
     }
 }

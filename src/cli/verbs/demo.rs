@@ -66,16 +66,20 @@ impl Verb for Demo {
             record: &record,
             estimate: &estimate,
         };
-        if let Some((folder, out)) = folder.zip(self.out.as_ref()) {
-            record.write(&folder.file("record.csv"))?;
+        let write = || {
+            let Some((folder, out)) = folder.zip(self.out.as_ref()) else {
+                return Ok(());
+            };
+            record.write_for(&folder.file("record.csv"), &study.twin().signals())?;
             answer.write(&folder, &provenance)?;
             folder.finish()?;
             output::say(&format!(
                 "demo: {0}/overlay.svg shows measured and twin, {0}/record.csv is the record",
                 out.display()
             ));
-        }
-        answer.print(context, &provenance)
+            Ok(())
+        };
+        deliver(write, || answer.print(context, &provenance))
     }
 }
 

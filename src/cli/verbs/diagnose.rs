@@ -51,6 +51,10 @@ pub(in crate::cli) struct Diagnose {
 }
 
 impl Verb for Diagnose {
+    fn has_partial_answer(&self) -> bool {
+        true
+    }
+
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let folder = output::asked_folder(&self.out)?;
         let study = context.study(&self.subject)?;
@@ -88,15 +92,21 @@ impl Verb for Diagnose {
             .files("validation", &self.validation)
             .files("estimator", &self.estimator);
         let json = provenance.on(found.json(&study));
-        if let Some(folder) = folder {
+        let write = || {
+            let Some(folder) = folder else { return Ok(()) };
             folder.write("report.json", format!("{json:#}"))?;
             folder.write("report.html", provenance.page(found.document(&study)))?;
             if let Some(next) = &found.cause.next_input {
-                folder.write(NEXT_INPUT, drive_csv_text(&next.drive))?;
+                folder.write(
+                    NEXT_INPUT,
+                    drive_csv_text(&next.drive, &study.twin().signals()),
+                )?;
             }
-            folder.finish()?;
-        }
-        let done = provenance.print(context, &json, || found.text(&study))?;
+            Ok(folder.finish()?)
+        };
+        let done = deliver(write, || {
+            provenance.print(context, &json, || found.text(&study))
+        })?;
         Ok(match found.interrupted {
             true => ExitCode::from(STOPPED),
             false => done,

@@ -76,11 +76,12 @@ impl Verb for Estimate {
                 estimate: &estimate.in_file(&self.records[0])?,
             };
             let provenance = provenance();
-            if let Some(folder) = folder {
+            let write = || {
+                let Some(folder) = folder else { return Ok(()) };
                 answer.write(&folder, &provenance)?;
-                folder.finish()?;
-            }
-            return answer.print(context, &provenance);
+                Ok(folder.finish()?)
+            };
+            return deliver(write, || answer.print(context, &provenance));
         }
         if settings.draws > 0 {
             return Err(Failure::user(
@@ -99,7 +100,8 @@ impl Verb for Estimate {
         let names: Vec<String> = names.collect();
         let provenance = provenance();
         let json = provenance.on(together_json(study, &all, &names));
-        if let Some(folder) = folder {
+        let write = || {
+            let Some(folder) = folder else { return Ok(()) };
             folder.write("estimate.json", format!("{json:#}"))?;
             for (number, (record, estimate)) in (1..).zip(records.iter().zip(&all.records)) {
                 let answer = Answer {
@@ -109,10 +111,10 @@ impl Verb for Estimate {
                 };
                 answer.write_pictures(&folder, &provenance, &format!("-{number}"))?;
             }
-            folder.finish()?;
-        }
+            Ok(folder.finish()?)
+        };
         let text = || together_document(study, &all, &names).text();
-        provenance.print(context, &json, text)
+        deliver(write, || provenance.print(context, &json, text))
     }
 }
 

@@ -27,7 +27,7 @@ pub(in crate::cli) struct Features {
 impl Verb for Features {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         if let Some(out) = &self.out {
-            output::check_new(out)?;
+            output::check_new_file(out)?;
         }
         let project = context.project(&self.subject)?;
         let study = project.study();

@@ -43,7 +43,8 @@ impl Verb for Fit {
         let fit = study.fit_with(&records, &settings, context.progress)?;
         let provenance = Provenance::new(context).files("record", &self.records);
         let json = provenance.on(fit.json(&study));
-        if let Some(folder) = folder {
+        let write = || {
+            let Some(folder) = folder else { return Ok(()) };
             folder.write("fit.json", format!("{json:#}"))?;
             let page = provenance.page(fit.document(&study, &records));
             folder.write("report.html", page)?;
@@ -60,8 +61,10 @@ impl Verb for Fit {
             if let Some(draws) = &fit.posterior {
                 posterior::write(&folder, &study, draws)?;
             }
-            folder.finish()?;
-        }
-        provenance.print(context, &json, || fit.text(&study))
+            Ok(folder.finish()?)
+        };
+        deliver(write, || {
+            provenance.print(context, &json, || fit.text(&study))
+        })
     }
 }

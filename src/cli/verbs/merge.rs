@@ -42,7 +42,7 @@ impl Verb for Merge {
             false => ("shards", merge(&self.from, &self.out, progress)?),
         };
         let json = json!({
-            "schema": "truetwin.merge/1", "out": self.out, "what": what, "count": count,
+            "schema": "truetwin.merge/1", "out": output::name(&self.out), "what": what, "count": count,
         });
         let text = || format!("{out}: {count} {what}");
         Provenance::new(context).print_beside(context, json, text)

@@ -39,12 +39,12 @@ pub(in crate::cli) struct Pretrain {
 }
 
 impl Verb for Pretrain {
-    fn is_resumed(&self) -> bool {
-        true
+    fn kept(&self) -> Option<PathBuf> {
+        Some(Pretraining::work_folder(&self.out))
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        output::check_folder(&self.out)?;
+        output::check_file(&self.out)?;
         let project = context.project(&self.subject)?;
         let study = project.study();
         let clock = Instant::now();
@@ -67,7 +67,7 @@ impl Verb for Pretrain {
         let bank = estimator.settings().bank_size;
         let loss = history.training.last().copied().unwrap_or(f64::NAN);
         let json = json!({
-            "schema": "truetwin.pretrain/1", "twin": study.name(), "estimator": self.out,
+            "schema": "truetwin.pretrain/1", "twin": study.name(), "estimator": output::name(&self.out),
             "preset": estimator.preset(), "bank_size": bank, "features": estimator.network().inputs(),
             "epochs": history.epochs_run, "loss": loss, "seed": context.seed, "seconds": seconds,
         });

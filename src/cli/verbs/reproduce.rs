@@ -96,8 +96,8 @@ pub(in crate::cli) struct Reproduce {
 }
 
 impl Verb for Reproduce {
-    fn is_resumed(&self) -> bool {
-        self.out.is_some()
+    fn kept(&self) -> Option<PathBuf> {
+        self.out.clone()
     }
 
     fn is_shared_out(&self) -> bool {
@@ -156,7 +156,8 @@ impl Verb for Reproduce {
         let provenance = Provenance::new(context).files("estimator", &self.estimator);
         let json = provenance.on(reproduce_json(study, &plan, estimator.preset(), &scores));
         let text = reproduce_text(study, &plan, estimator.preset(), &scores);
-        if let Some(folder) = &folder {
+        let write = || {
+            let Some(folder) = &folder else { return Ok(()) };
             let stage = context.progress.stage("figures", 1);
             draw(folder, study, &plan, &runs)?;
             if let Some(svg) = coverage_svg(study, &scores.points) {
@@ -165,9 +166,9 @@ impl Verb for Reproduce {
             stage.finish();
             folder.write("table.txt", &text)?;
             // Written last: it marks the folder as complete.
-            folder.write("reproduce.json", &format!("{json:#}\n"))?;
-        }
-        provenance.print(context, &json, || text)
+            Ok(folder.write("reproduce.json", &format!("{json:#}\n"))?)
+        };
+        deliver(write, || provenance.print(context, &json, || text.clone()))
     }
 }
 

@@ -45,7 +45,7 @@ enum Inputs {
 
 impl Verb for Resample {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        output::check_new(&self.out)?;
+        output::check_new_file(&self.out)?;
         let record = self.columns.reader_without_twin().record(&self.record)?;
         let rule = match self.inputs {
             Inputs::Mean => InputRule::Mean,
@@ -61,7 +61,7 @@ impl Verb for Resample {
             })
         };
         let json = json!({
-            "schema": "truetwin.resample/1", "record": self.out,
+            "schema": "truetwin.resample/1", "record": output::name(&self.out),
             "inputs": match self.inputs { Inputs::Mean => "mean", Inputs::Hold => "hold" },
             "before": grid(&record), "after": grid(&new.record),
             "interpolated": new.interpolated, "longest_gap": new.longest_gap,

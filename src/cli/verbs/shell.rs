@@ -58,7 +58,8 @@ impl Verb for Man {
             }
             folder.finish()?;
             let names: Vec<&String> = pages.iter().map(|(name, _)| name).collect();
-            let json = json!({ "schema": "truetwin.man/1", "folder": out, "pages": names });
+            let json =
+                json!({ "schema": "truetwin.man/1", "folder": output::name(out), "pages": names });
             return context.print(&json, || {
                 let (out, program) = (out.display(), context.program);
                 format!("{out}: {} pages\nnext: man {out}/{program}.1", names.len())

@@ -2,7 +2,7 @@
 
 use crate::cli::prelude::*;
 use crate::effect::{Effect, augment};
-use crate::record::{Drive, Record, record_csv_text};
+use crate::record::{Drive, Record, twin_csv_text};
 use crate::setting::{did_you_mean, number};
 use crate::twin::{Noise, Parameter, ParameterSpace, Role, Twin};
 use std::collections::BTreeMap;
@@ -38,8 +38,9 @@ pub(in crate::cli) struct Simulate {
 impl Verb for Simulate {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         if let Some(out) = &self.out {
-            output::check_new(out)?;
+            output::check_new_file(out)?;
         }
+        self.columns.check_used(self.input.is_some(), "--input U.csv")?;
         let study = context.study(&self.subject)?;
         let given = parse_theta(&self.theta)?;
         let mut twin = study.twin().clone();
@@ -59,20 +60,21 @@ impl Verb for Simulate {
         let noise = if self.noise_free { Noise::OFF } else { noise };
         let outputs = twin.simulate(&theta, &drive, noise)?;
         let record = Record::complete(drive, outputs)?;
+        let signals = twin.signals();
         if let Some(out) = &self.out {
-            record.write(out)?;
+            record.write_for(out, &signals)?;
         }
         let rows = || record.outputs().rows().into_iter().map(|row| row.to_vec());
         let json = json!({
             "schema": "truetwin.simulate/1", "twin": study.name(),
             "names": twin.parameters().names(), "theta": theta,
             "seed": context.seed, "noise_free": self.noise_free,
-            "samples": record.samples(), "step": record.drive().dt(), "record": self.out,
+            "samples": record.samples(), "step": record.drive().dt(), "record": self.out.as_deref().map(output::name),
             "y": self.out.is_none().then(|| rows().collect::<Vec<_>>()),
         });
         let text = || match &self.out {
             Some(_) => String::new(),
-            None => record_csv_text(&record),
+            None => twin_csv_text(&record, &signals),
         };
         Provenance::new(context)
             .files("input", &self.input)

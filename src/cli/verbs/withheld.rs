@@ -61,7 +61,12 @@ impl Verb for Withheld {
         true
     }
 
+    fn kept(&self) -> Option<PathBuf> {
+        Some(self.out.clone())
+    }
+
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        (self.columns).check_used(self.like.is_some(), "--like RECORD.csv")?;
         let study = context.study(&self.subject)?;
         let like = self.like.as_deref();
         let like = like.map(|path| self.columns.reader(&study).record(path));
@@ -94,10 +99,12 @@ impl Verb for Withheld {
         let card = sealed.score(context.progress)?;
         let provenance = Provenance::new(context).files("record", &self.like);
         let json = provenance.on(card.json());
-        sealed.write("scorecard.html", &provenance.page(card.document()))?;
-        // Written last: it marks the folder as complete.
-        sealed.write("scorecard.json", &format!("{json:#}\n"))?;
-        provenance.print(context, &json, || card.text())
+        let write = || {
+            sealed.write("scorecard.html", &provenance.page(card.document()))?;
+            // Written last: it marks the folder as complete.
+            Ok(sealed.write("scorecard.json", &format!("{json:#}\n"))?)
+        };
+        deliver(write, || provenance.print(context, &json, || card.text()))
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::functions::Curve;
 use crate::diagnose::outcome::{Discovery, Term};
-use crate::math::quantile;
+use crate::math::{quantile, solve_truncated};
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 
@@ -90,11 +90,7 @@ pub(in crate::diagnose) fn discover(
     // What the two most frequent ones explain of the function itself.
     let subset: Vec<usize> = found.iter().take(2).map(|(k, _)| *k).collect();
     let chosen = columns.select_columns(&subset);
-    let factors = chosen
-        .clone()
-        .svd(true, true)
-        .solve(&curve.mean, 1e-12)
-        .ok()?;
+    let factors = solve_truncated(&chosen, &curve.mean, 1e-12).ok()?;
     let rest = &curve.mean - chosen * factors;
     let mean = curve.mean.mean();
     let whole = curve.mean.map(|v| v - mean).norm_squared().max(1e-300);

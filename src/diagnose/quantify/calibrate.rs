@@ -1,25 +1,32 @@
 //! Calibration: evidence for a gap in records that the fitted twin itself has made.
 
+use crate::diagnose::settings::DiagnoseSettings;
 use crate::hypothesis::search::model::Model;
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::Noise;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Returns the evidence for a gap in each simulated record.
+/// Returns the evidence for a gap in each simulated record, and whether the work was stopped before the last: those that were done are
+/// given where the settings allow.
 pub(in crate::diagnose) fn calibrate(
     model: &Model,
-    count: usize,
+    settings: &DiagnoseSettings,
     log_odds: impl Fn(&[Record]) -> Result<f64, StudyError> + Sync,
     noise: Noise,
     stage: &Stage,
-) -> Result<Vec<f64>, StudyError> {
+) -> Result<(Vec<f64>, bool), StudyError> {
+    let is_cut = AtomicBool::new(false);
     let theta = &model.fitted.theta;
     let problem = &model.problem;
-    let values: Vec<Option<f64>> = (0..count as u64)
+    let values: Vec<Option<f64>> = (0..settings.calibrate as u64)
         .into_par_iter()
         .map(|i| {
+            if is_cut.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
             let mut records = vec![];
             for (r, record) in problem.records.iter().enumerate() {
                 let noise = noise
@@ -42,13 +49,19 @@ pub(in crate::diagnose) fn calibrate(
             let value = match log_odds(&records) {
                 Ok(value) => Some(value),
                 Err(StudyError::NoStart) => None,
+                Err(StudyError::Cancelled(_)) if settings.give_partial => {
+                    is_cut.store(true, Ordering::Relaxed);
+                    return Ok(None);
+                }
                 Err(error) => return Err(error),
             };
-            stage.tick()?;
+            if settings.ends(stage.tick())? {
+                is_cut.store(true, Ordering::Relaxed);
+            }
             Ok(value)
         })
         .collect::<Result<_, StudyError>>()?;
-    Ok(values.into_iter().flatten().collect())
+    Ok((values.into_iter().flatten().collect(), is_cut.into_inner()))
 }
 
 /// p-value of measured evidence among simulated, and whether it is as small as so many simulations allow; `None` without any.

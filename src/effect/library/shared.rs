@@ -1,6 +1,7 @@
 //! Laws and magnitudes that sensors and actuators share.
 
 use super::super::magnitude::{Magnitude, Shape};
+use crate::math::nearest;
 use crate::setting::number;
 use crate::twin::Remember;
 
@@ -137,7 +138,7 @@ fn deflected(z: f64, way: f64) -> f64 {
 pub(super) fn delay(delay: f64, dt: f64, past: &mut [f64], value: f64) -> f64 {
     past.rotate_right(1);
     past[0] = value;
-    let ago = (delay / dt).clamp(0.0, (past.len() - 1) as f64);
+    let ago = nearest(delay / dt, 0.0, past.len().saturating_sub(1) as f64);
     let (i, f) = (ago.trunc() as usize, ago.fract());
     if f == 0.0 {
         past[i]

@@ -11,9 +11,9 @@ use super::Draws;
 use super::npy::{self, Npz, archive};
 use crate::estimator::error::EstimatorError;
 use crate::storage::files::write_new;
+use crate::storage::reading::{Reading, note_whole, open};
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt};
 use ndarray::Array2;
-use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
@@ -81,10 +81,15 @@ pub fn read(path: &Path, names: &[&str]) -> Result<Draws, EstimatorError> {
     if !is_named(path) {
         return Err(other_form(path));
     }
-    let file = File::open(path).map_err(|error| EstimatorError::io(path, error))?;
+    let unread = |error| EstimatorError::io(path, error);
     let draws = match extension(path) {
-        "npz" => from_npz(io::BufReader::new(file)),
-        _ => from_csv(file, names),
+        "npz" => {
+            let file = open(path).map_err(unread)?;
+            let draws = from_npz(io::BufReader::new(&file));
+            note_whole(path, &file).map_err(unread)?;
+            draws
+        }
+        _ => from_csv(Reading::open(path).map_err(unread)?, names),
     };
     draws
         .and_then(|draws| check(&draws, names.len()).map(|()| draws))
@@ -182,6 +187,7 @@ fn from_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
 mod tests {
     use super::*;
     use ndarray::array;
+    use std::fs::File;
 
     fn draws() -> Draws {
         Draws {

@@ -230,6 +230,13 @@ impl Pretraining {
         }
     }
 
+    /// Returns where the work on the estimator at `path` is kept.
+    pub fn work_folder(path: &Path) -> PathBuf {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ENDING);
+        name.into()
+    }
+
     /// Pretrains, or goes on with it, and writes the estimator.
     ///
     /// An estimator that is there already is written again only where the folder of this very pretraining is still there: what
@@ -242,13 +249,13 @@ impl Pretraining {
         // What the network cannot take is said before anything is simulated.
         let plan = PretrainPlan::new(&self.project, self.sized())?;
         let manifest = self.manifest(&plan.settings)?;
-        let place = beside(path);
+        let place = Self::work_folder(path);
         sweep_beside(path);
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
             let problem = "exists already; choose another name, or remove it";
             return Err(EstimatorError::file(path, problem));
         }
-        let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(()))?;
+        let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(None))?;
         let lock = folder.lock()?;
         let made = self.made(plan, &folder, progress).and_then(|made| {
             made.0.save_again(path)?;
@@ -334,13 +341,6 @@ fn ends_for_good(error: &EstimatorError) -> bool {
 /// Returns whether nothing is kept in the folder yet.
 fn is_bare(folder: &WorkFolder) -> bool {
     !folder.file(TRAINING).exists() && !ShardedBank::is_begun(&folder.file(BANK))
-}
-
-/// Where the work on the estimator at `path` is kept.
-fn beside(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(ENDING);
-    name.into()
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ use crate::estimator::error::EstimatorError;
 use crate::estimator::gate::{GateTest, whiten};
 use crate::estimator::settings::RefineSettings;
 use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem, space_filling};
-use crate::math::{MathError, Stencil, Whitening};
+use crate::math::{MathError, Stencil, Whitening, thin_svd};
 use crate::progress::Stage;
 use crate::twin::{Interval, Noise};
 use nalgebra::{DMatrix, DVector};
@@ -52,8 +52,8 @@ impl RefinedEstimate {
 
     /// The part of a whitened residual that θ could still remove, ‖P_J r‖²: χ²_d at the true θ.
     pub fn explainable_misfit(&self, residual: &DVector<f64>) -> f64 {
-        let svd = self.whitened_jacobian().svd(true, false);
-        svd.u.map_or(0.0, |u| u.tr_mul(residual).norm_squared())
+        let svd = thin_svd(&self.whitened_jacobian());
+        svd.map_or(0.0, |svd| svd.left.tr_mul(residual).norm_squared())
     }
 }
 

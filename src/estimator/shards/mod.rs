@@ -80,7 +80,7 @@ impl BankPlan {
         let features = &self.project.recipe(self.preset).features;
         let prior = Prior::new(self.project.study(), features.as_ref())?;
         let manifest = self.manifest()?;
-        let folder = WorkFolder::open::<EstimatorError>(path, &manifest, &[SHARDS], |_| Ok(()))?;
+        let folder = WorkFolder::open::<EstimatorError>(path, &manifest, &[SHARDS], |_| Ok(None))?;
         let shards = Shards::list(folder, manifest.clone())?;
         let mine = || (0..shards.of).filter(|number| share.takes(*number));
         let stage = progress.stage("kept shards", mine().count());
@@ -150,7 +150,7 @@ pub fn merge(from: &[PathBuf], out: &Path, progress: &Progress) -> Result<usize,
         return Ok(0);
     };
     let holders = holders(&all, first.of)?;
-    let folder = WorkFolder::open::<EstimatorError>(out, &first.manifest, &[SHARDS], |_| Ok(()))?;
+    let folder = WorkFolder::open::<EstimatorError>(out, &first.manifest, &[SHARDS], |_| Ok(None))?;
     let new = folder.clone();
     let fill = || {
         let merged = Shards::list(folder, first.manifest.clone())?;

@@ -16,7 +16,7 @@ use std::path::Path;
 pub(super) const RUNS: &str = "runs";
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 3;
+const LAYOUT: u32 = 4;
 
 /// Source of a study's estimator.
 #[derive(Debug, Clone, Copy)]
@@ -111,7 +111,7 @@ impl MonteCarlo {
         origin: Origin<'_>,
     ) -> Result<WorkFolder, StorageError> {
         let manifest = self.manifest(study, origin)?;
-        WorkFolder::open(path, &manifest, &[RUNS], |_| Ok(()))
+        WorkFolder::open(path, &manifest, &[RUNS], |_| Ok(None))
     }
 
     /// Everything that the runs depend on; files by their checksums.

@@ -3,14 +3,18 @@
 use super::truth::Truth;
 use crate::evaluate::EvaluateError;
 use crate::record::{Record, record_csv_text};
-use crate::storage::files::sha256;
+use crate::storage::checksum::sha256;
+use crate::storage::reading::checksum_of_read;
 use crate::storage::untrusted::check_file;
 use crate::storage::work::{Manifest, WorkFolder};
 use crate::storage::{NewFolder, StorageError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+use std::cell::RefCell;
 use std::io;
 use std::path::Path;
+use std::sync::Arc;
 
 const KEYS: &str = "keys.json";
 const SEAL: &str = "seal.txt";
@@ -28,6 +32,7 @@ pub(super) const SHARES: &str = "shares";
 /// | `keys.json` | the truth of every trial; not read again before every answer is there |
 /// | `seal.txt` | SHA-256 of `keys.json`, published before the first diagnosis |
 /// | `left-out.json` | the effects that each trial's library does without, where the call asks for that |
+/// | `manifest.json` | what every such folder has, and the checksums of the records |
 /// | `records/0000.csv`, `records/0000-validation.csv`, `records/0000-doubled.csv` | what the diagnoser sees |
 /// | `answers/0000.json` | what it said |
 /// | `shares/0000.json` | the share that the true effects close, measured once the keys are open |
@@ -35,6 +40,8 @@ pub(super) const SHARES: &str = "shares";
 #[derive(Debug, Clone)]
 pub(super) struct Folder {
     pub work: WorkFolder,
+    /// Checksums of the records, by name.
+    records: Arc<Map<String, Value>>,
     /// SHA-256 of the key file.
     pub seal: String,
 }
@@ -58,13 +65,20 @@ fn record_name(trial: usize, which: Which) -> String {
 }
 
 /// A new folder that is filled with sealed trials.
-pub(super) struct Filling<'a>(&'a NewFolder);
+pub(super) struct Filling<'a> {
+    folder: &'a NewFolder,
+    /// Checksums of the records, by name.
+    records: RefCell<Map<String, Value>>,
+}
 
 impl Filling<'_> {
     /// Adds a record.
     pub fn record(&self, trial: usize, which: Which, record: &Record) -> Result<(), StorageError> {
         let name = record_name(trial, which);
-        self.0.write(&name, record_csv_text(record).as_bytes())
+        let text = record_csv_text(record);
+        self.folder.write(&name, text.as_bytes())?;
+        (self.records.borrow_mut()).insert(name, sha256(text.as_bytes()).into());
+        Ok(())
     }
 
     /// Says which effects each trial's library does without: the diagnoser may know that much.
@@ -76,14 +90,14 @@ impl Filling<'_> {
     pub fn keys(&self, keys: &[Truth]) -> Result<(), StorageError> {
         let keys = self.json(KEYS, keys)?;
         let seal = sha256(keys.as_bytes());
-        self.0.write(SEAL, format!("{seal}\n").as_bytes())
+        self.folder.write(SEAL, format!("{seal}\n").as_bytes())
     }
 
     fn json<T: Serialize + ?Sized>(&self, name: &str, value: &T) -> Result<String, StorageError> {
         let text = serde_json::to_string_pretty(value)
             .map_err(|error| StorageError::io(Path::new(name), io::Error::from(error)))?;
         let text = format!("{text}\n");
-        self.0.write(name, text.as_bytes())?;
+        self.folder.write(name, text.as_bytes())?;
         Ok(text)
     }
 }
@@ -96,17 +110,35 @@ impl Folder {
         fill: impl FnOnce(&Filling<'_>) -> Result<(), EvaluateError>,
     ) -> Result<Self, EvaluateError> {
         let parts = [RECORDS, ANSWERS, SHARES];
-        let work = WorkFolder::open(path, manifest, &parts, |new| fill(&Filling(new)))?;
+        let work = WorkFolder::open(path, manifest, &parts, |folder| {
+            let records = RefCell::default();
+            let filling = Filling { folder, records };
+            fill(&filling)?;
+            Ok::<_, EvaluateError>(Some(filling.records.into_inner().into()))
+        })?;
         let seal = work.read(SEAL)?.trim().into();
-        Ok(Self { work, seal })
+        let (_, kept) = WorkFolder::find(path, manifest.verb())?;
+        let records = kept.checksums().and_then(Value::as_object).cloned();
+        let records = Arc::new(records.unwrap_or_default());
+        Ok(Self {
+            work,
+            records,
+            seal,
+        })
     }
 
     /// Reads a trial's record.
     pub fn record(&self, trial: usize, which: Which) -> Result<Record, EvaluateError> {
         self.work.part(RECORDS)?;
-        let path = self.work.file(&record_name(trial, which));
+        let name = record_name(trial, which);
+        let path = self.work.file(&name);
         check_file(&path).map_err(|error| StorageError::io(&path, error))?;
-        Ok(Record::read(&path)?)
+        let record = Record::read(&path)?;
+        let sealed = self.records.get(&name).and_then(Value::as_str);
+        match checksum_of_read(&path).as_deref() == sealed {
+            true => Ok(record),
+            false => Err(self.damaged(&name, "its SHA-256 is not that of manifest.json")),
+        }
     }
 
     /// Opens the keys of so many trials, if they are still those that were sealed.

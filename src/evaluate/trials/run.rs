@@ -19,7 +19,7 @@ use crate::progress::Progress;
 use crate::record::record_csv_text;
 use crate::setting::SettingError;
 use crate::storage::StorageError;
-use crate::storage::files::sha256;
+use crate::storage::checksum::sha256;
 use crate::storage::work::{Manifest, Piece, Pieces, Share};
 use crate::study::Study;
 use crate::twin::Noise;
@@ -30,7 +30,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 12;
+const LAYOUT: u32 = 13;
 
 /// Sealed trials over one study.
 ///

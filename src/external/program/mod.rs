@@ -23,6 +23,7 @@ pub(crate) mod fuzzing;
 mod health;
 mod pool;
 mod protocol;
+mod running;
 mod worker;
 
 use super::check_call;
@@ -34,6 +35,7 @@ use description::Description;
 use health::Health;
 use pool::{Pool, introduce};
 use protocol::ProgramAnswer;
+pub(crate) use running::end_all;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use worker::{ProgramCommand, Trouble};

@@ -4,8 +4,10 @@ use super::description::Description;
 use crate::record::{Drive, Signal, Signals};
 use crate::setting::number;
 use crate::storage::untrusted::{excerpt, message};
-use serde::{Deserialize, Serialize, Serializer};
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// The version of the protocol, told with the first request.
 const VERSION: u32 = 1;
@@ -98,9 +100,39 @@ pub(super) enum ProgramAnswer {
 )]
 struct ToldAnswer {
     id: u64,
-    outputs: Option<BTreeMap<String, Vec<Option<f64>>>>,
+    outputs: Option<ToldOutputs>,
     diverged: Option<f64>,
     error: Option<String>,
+}
+
+/// Outputs by name, each once.
+#[derive(Debug)]
+struct ToldOutputs(BTreeMap<String, Vec<Option<f64>>>);
+
+impl<'de> Deserialize<'de> for ToldOutputs {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct EachOnce;
+        impl<'de> Visitor<'de> for EachOnce {
+            type Value = BTreeMap<String, Vec<Option<f64>>>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object with a list of numbers for each output")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+                let mut all = BTreeMap::new();
+                while let Some((name, values)) = map.next_entry::<String, _>()? {
+                    if all.contains_key(&name) {
+                        let name = excerpt(&name);
+                        return Err(A::Error::custom(format!("output {name} is given twice")));
+                    }
+                    all.insert(name, values);
+                }
+                Ok(all)
+            }
+        }
+        deserializer.deserialize_map(EachOnce).map(Self)
+    }
 }
 
 /// Reads the answer to request `id`; the error says what is wrong with it and what to answer instead.
@@ -124,7 +156,7 @@ pub(super) fn answer(
         ));
     }
     match (told.outputs, told.diverged, told.error) {
-        (Some(outputs), None, None) => stack(outputs, signals, drive),
+        (Some(outputs), None, None) => stack(outputs.0, signals, drive),
         (None, Some(at), None) => {
             let end = drive.time(drive.samples());
             if (0.0..=end).contains(&at) {
@@ -293,6 +325,10 @@ mod tests {
             (
                 r#"{"id": 7, "outputs": {"y": [1, 2, 3], "z": []}}"#,
                 "z is no output",
+            ),
+            (
+                r#"{"id": 7, "outputs": {"y": [1, 2, 3], "y": [4, 5, 6]}}"#,
+                "output y is given twice",
             ),
             (r#"{"id": 7}"#, "exactly one of"),
             (r#"{"id": 7, "outptus": {}}"#, "unknown key `outptus`"),

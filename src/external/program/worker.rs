@@ -1,5 +1,6 @@
 //! The command that starts a program, and one running copy of it, asked line by line.
 
+use super::running::Running;
 use crate::storage::files::with_remedy;
 use crate::storage::untrusted::{excerpt, one_line};
 use crate::study::StudyError;
@@ -96,7 +97,7 @@ impl Trouble {
 /// Reading, writing and draining have a thread each: pipes know no time-outs, and a program that neither reads nor writes
 /// must not hold up more than its own request. The threads end with the pipes.
 pub(super) struct Worker {
-    child: Child,
+    child: Running,
     /// Dropped, it closes the program's standard input.
     requests: Option<Sender<String>>,
     pieces: Receiver<Vec<u8>>,
@@ -109,15 +110,16 @@ pub(super) struct Worker {
 impl Worker {
     /// Starts the program.
     pub fn start(command: &ProgramCommand) -> io::Result<Self> {
-        let mut child = (command.command())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()?;
+        let mut command = command.command();
+        let child = Running::start(
+            (command.stdin(Stdio::piped()))
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped()),
+        )?;
         let missing = || io::Error::other("the system gave no pipe");
-        let (Some(stdin), Some(stdout), Some(stderr)) =
-            (child.stdin.take(), child.stdout.take(), child.stderr.take())
-        else {
+        let pipes =
+            |child: &mut Child| (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let (Some(stdin), Some(stdout), Some(stderr)) = child.with(pipes) else {
             return Err(missing());
         };
         let (requests, to_write) = channel::<String>();
@@ -187,7 +189,7 @@ impl Worker {
 
     /// Returns whether the process still runs.
     pub fn lives(&mut self) -> bool {
-        matches!(self.child.try_wait(), Ok(None))
+        matches!(self.child.ended(), Ok(None))
     }
 
     /// Returns the last lines of standard error, as the end of a message; empty if there are none.
@@ -205,7 +207,7 @@ impl Worker {
         while self.lives() && Instant::now() < by {
             thread::sleep(Duration::from_millis(2));
         }
-        let how = match self.child.try_wait() {
+        let how = match self.child.ended() {
             Ok(Some(status)) => format!("ended ({status})"),
             _ => "closed its standard output".to_owned(),
         };
@@ -227,9 +229,7 @@ impl Worker {
         while self.lives() && Instant::now() < by {
             thread::sleep(Duration::from_millis(1));
         }
-        // Of a process that is gone already, both say so.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.child.end();
     }
 }
 

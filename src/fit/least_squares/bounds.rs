@@ -1,4 +1,4 @@
-use crate::math::MathError;
+use crate::math::{MathError, nearest};
 use nalgebra::DVector;
 
 /// A box: lower ≤ θ ≤ upper for each parameter, each side finite or not.
@@ -44,7 +44,7 @@ impl Bounds {
     /// The point of the box nearest to `theta`, of length d. NaN stays NaN.
     pub fn project(&self, theta: &DVector<f64>) -> DVector<f64> {
         theta.zip_zip_map(&self.lower, &self.upper, |value, low, high| {
-            value.clamp(low, high)
+            nearest(value, low, high)
         })
     }
 }

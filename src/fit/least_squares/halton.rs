@@ -1,3 +1,4 @@
+use crate::math::nearest;
 use nalgebra::DVector;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
@@ -37,7 +38,7 @@ pub fn space_filling(bounds: &Bounds, count: usize, seed: u64) -> Vec<DVector<f6
         }
         let (low, high) = (bounds.lower()[j], bounds.upper()[j]);
         for (point, value) in points.iter_mut().zip(value) {
-            point[j] = (low + value * (high - low)).clamp(low, high);
+            point[j] = nearest(low + value * (high - low), low, high);
         }
     }
     points

@@ -1,5 +1,6 @@
 //! Coordinates in which parameters are alike.
 
+use crate::math::nearest;
 use crate::twin::ParameterSpace;
 use nalgebra::DVector;
 
@@ -65,14 +66,16 @@ impl Coordinates {
         (0..phi.len())
             .map(|j| {
                 let value = if self.log[j] { phi[j].exp() } else { phi[j] };
-                value.clamp(self.theta_lower[j], self.theta_upper[j])
+                nearest(value, self.theta_lower[j], self.theta_upper[j])
             })
             .collect()
     }
 
     /// The nearest φ within the bounds.
     pub fn clamp(&self, phi: &DVector<f64>) -> DVector<f64> {
-        DVector::from_fn(phi.len(), |j, _| phi[j].clamp(self.lower[j], self.upper[j]))
+        DVector::from_fn(phi.len(), |j, _| {
+            nearest(phi[j], self.lower[j], self.upper[j])
+        })
     }
 
     /// φ with entry j moved by `share` of its step, downwards where the upper bound is nearer; and how far it moved, rounding included.

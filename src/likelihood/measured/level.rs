@@ -115,6 +115,14 @@ pub(super) struct DeclaredLevels {
     pub measurement: Vec<f64>,
 }
 
+/// Prior and bounds of a level, no lower than `floor`.
+fn ranges(median: f64, deviation: f64, floor: f64) -> [Interval; 2] {
+    [deviation, RANGE].map(|reach| {
+        let low = (median / reach.exp()).max(floor);
+        Interval::unchecked(low, median * reach.exp())
+    })
+}
+
 /// The twin with these sizes of states and outputs.
 pub(super) fn build(
     base: &Composed,
@@ -151,12 +159,13 @@ pub(super) fn build(
         } else {
             (guess, UNDECLARED)
         };
-        let reach = RANGE.exp();
-        let bounds = Interval::unchecked((median / reach).max(floor), median * reach);
+        // The least level that the record can tell stands for a declared one below it.
+        let median = median.max(floor);
+        let [prior, bounds] = ranges(median, deviation, floor);
         let parameter = Parameter {
             name: role_name,
             unit,
-            prior: Interval::unchecked(median / deviation.exp(), median * deviation.exp()),
+            prior,
             bounds,
             role: Role::Noise,
         };

@@ -26,7 +26,7 @@ impl Ticks {
         // Multiples of the step, not sums of it: no drift.
         let slack = 1e-9;
         let (first, last) = ((low / step - slack).ceil(), (high / step + slack).floor());
-        let count = (last - first).clamp(0.0, 4.0 * wanted as f64) as usize;
+        let count = (last - first).max(0.0).min(4.0 * wanted as f64) as usize;
         let at: Vec<f64> = (0..=count).map(|i| (first + i as f64) * step).collect();
         let largest = at.iter().fold(step, |a, v| a.max(v.abs()));
         let place = (step * (1.0 + slack)).log10().floor() as i32;

@@ -2,6 +2,7 @@
 
 use super::axis::Ticks;
 use super::canvas::{BOLD, Canvas, EDGE, GAP, GRID, LINE, ROOM, TEXT, WIDTH, clipped, width};
+use crate::math::nearest;
 
 /// Height of a row and of the bar inside it.
 const ROW: f64 = 25.0;
@@ -138,7 +139,11 @@ impl Scale {
             true => value / self.full,
             false => 0.0,
         };
-        (self.left + share * (self.right - self.left)).clamp(self.left, self.right)
+        nearest(
+            self.left + share * (self.right - self.left),
+            self.left,
+            self.right,
+        )
     }
 
     /// Positions and labels of its ticks.

@@ -9,7 +9,7 @@ mod show;
 pub(crate) use rows::Rows;
 pub(crate) use show::{check_names, excerpt, hidden, message, one_line, printable, quoted};
 
-use std::fs::File;
+use super::reading::Reading;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -18,9 +18,9 @@ pub(crate) const MOST_NUMBERS: usize = 1 << 29;
 
 /// The bytes of a file, `most` of them; a longer one is refused, also one that has no end.
 pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    let file = File::open(path)?;
+    let file = Reading::open(path)?;
     // Of a pipe or a device the system knows no length.
-    let length = file.metadata()?.len();
+    let length = file.length()?;
     let mut bytes = Vec::new();
     if length <= most {
         bytes.reserve_exact(length as usize);

@@ -1,7 +1,9 @@
 //! A folder that keeps finished pieces of long work.
 
 use super::manifest::{CHECKSUMS, Manifest};
-use crate::storage::files::{folder, replace, write_new};
+use super::piece;
+use crate::storage::files::{replace, write_new};
+use crate::storage::place::check_place;
 use crate::storage::unfinished;
 use crate::storage::untrusted::{check_file, check_folder, message, read_kept_text};
 use crate::storage::{NewFolder, StorageError, sweep_beside};
@@ -22,34 +24,38 @@ const MOST: u64 = 1 << 28;
 /// | file | holds |
 /// |---|---|
 /// | `manifest.json` | everything the pieces depend on; a call that differs is refused |
-/// | `PART/0000.json`, … | one piece each; appears when it is complete |
+/// | `PART/0000.json`, … | one piece each, with its checksum; appears when it is complete |
 /// | others | inputs of the work, and results made of the pieces |
 #[derive(Debug, Clone)]
 pub struct WorkFolder {
     path: PathBuf,
+    /// Checksum of the manifest that the pieces depend on.
+    identity: String,
 }
 
 impl WorkFolder {
-    /// Resumes the folder of the same call; or makes it, with a folder for each of `parts` and the files that `fill` adds.
+    /// Resumes the folder of the same call; or makes it, with a folder for each of `parts` and the files that `fill` adds, whose checksums
+    /// it returns for the manifest, if it has any.
     ///
     /// The folder appears complete. If several processes make it at once, one wins, and all continue with its folder.
     pub(crate) fn open<E: From<StorageError>>(
         path: &Path,
         manifest: &Manifest,
         parts: &[&str],
-        fill: impl FnOnce(&NewFolder) -> Result<(), E>,
+        fill: impl FnOnce(&NewFolder) -> Result<Option<Value>, E>,
     ) -> Result<Self, E> {
         if path.symlink_metadata().is_err() {
-            if !folder(path).is_dir() {
-                return Err(StorageError::NoParent(path.into()).into());
-            }
+            check_place(path)?;
             let made = || -> Result<(), E> {
                 let new = NewFolder::new(path)?;
                 for part in parts {
                     std::fs::create_dir(new.file(part))
                         .map_err(|error| StorageError::io(path, error))?;
                 }
-                fill(&new)?;
+                let mut manifest = manifest.clone();
+                if let Some(checksums) = fill(&new)? {
+                    manifest = manifest.with(CHECKSUMS, checksums);
+                }
                 new.write(MANIFEST, manifest.text())?;
                 Ok(new.finish()?)
             };
@@ -72,7 +78,7 @@ impl WorkFolder {
         match read_manifest(&path, verb) {
             Err(reason) => Err(StorageError::Taken { path, verb, reason }),
             Ok(kept) => match manifest.differs(&kept) {
-                None => Ok(Self { path }),
+                None => Ok(Self::of(path, kept)),
                 Some(difference) => Err(StorageError::OtherCall { path, difference }),
             },
         }
@@ -82,9 +88,14 @@ impl WorkFolder {
     pub(crate) fn find(path: &Path, verb: &'static str) -> Result<(Self, Manifest), StorageError> {
         let path = path.to_owned();
         match read_manifest(&path, verb) {
-            Ok(manifest) => Ok((Self { path }, manifest)),
+            Ok(manifest) => Ok((Self::of(path, manifest.clone()), manifest)),
             Err(reason) => Err(StorageError::Foreign { path, verb, reason }),
         }
+    }
+
+    fn of(path: PathBuf, manifest: Manifest) -> Self {
+        let identity = manifest.unfinished().checksum();
+        Self { path, identity }
     }
 
     /// Path of the folder.
@@ -150,7 +161,7 @@ impl WorkFolder {
             path: path.clone(),
             reason: message(&reason),
         };
-        let piece: T = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let piece: T = piece::parse(&text, &self.identity).map_err(wrong)?;
         fits(&piece).map_err(|reason| wrong(reason.into()))?;
         Ok(Some(piece))
     }
@@ -163,9 +174,9 @@ impl WorkFolder {
         piece: &T,
     ) -> Result<(), StorageError> {
         let path = self.piece(part, number)?;
-        let written = serde_json::to_string_pretty(piece)
+        let written = piece::text(piece, &self.identity)
             .map_err(io::Error::from)
-            .and_then(|text| write_new(&path, format!("{text}\n").as_bytes()));
+            .and_then(|text| write_new(&path, text.as_bytes()));
         match written {
             Err(error) if !path.exists() => Err(StorageError::io(&path, error)),
             _ => Ok(()),
@@ -232,6 +243,7 @@ fn appears(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
     use std::fs;
 
     fn manifest(runs: u32) -> Manifest {
@@ -240,7 +252,7 @@ mod tests {
 
     fn open(path: &Path, runs: u32) -> Result<WorkFolder, StorageError> {
         WorkFolder::open(path, &manifest(runs), &["runs"], |new| {
-            new.write("start.txt", b"a")
+            new.write("start.txt", b"a").map(|()| None)
         })
     }
 
@@ -249,21 +261,55 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("work");
         let folder = open(&path, 2).unwrap();
-        let any = |_: &Vec<u32>| Ok(());
+        let piece = |x: f64| json!({ "number": 1, "x": x });
+        let any = |_: &Value| Ok(());
         assert_eq!(folder.kept("runs", 1, any).unwrap(), None);
-        folder.keep("runs", 1, &vec![1, 2]).unwrap();
-        folder.keep("runs", 1, &vec![3]).unwrap();
+        folder.keep("runs", 1, &piece(0.1)).unwrap();
+        folder.keep("runs", 1, &piece(3.0)).unwrap();
         let again = open(&path, 2).unwrap();
-        assert_eq!(again.kept("runs", 1, any).unwrap(), Some(vec![1, 2]));
-        let refused = |_: &Vec<u32>| Err("it is odd");
+        assert_eq!(again.kept("runs", 1, any).unwrap(), Some(piece(0.1)));
+        let refused = |_: &Value| Err("it is odd");
         let error = again.kept("runs", 1, refused).unwrap_err().to_string();
         assert!(
             error.contains("0001.json") && error.contains("it is odd"),
             "{error}"
         );
-        fs::write(path.join("runs/0001.json"), "[1, ").unwrap();
+        let file = path.join("runs/0001.json");
+        fs::write(&file, "[1, ").unwrap();
         let error = again.kept("runs", 1, any).unwrap_err().to_string();
         assert!(error.contains("remove it"), "{error}");
+    }
+
+    /// Another number in a piece, or a piece of another folder, is refused by name.
+    #[test]
+    fn altered_and_foreign_pieces_are_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let [ours, theirs] = [(2, "ours"), (3, "theirs")]
+            .map(|(runs, name)| open(&place.path().join(name), runs).unwrap());
+        let any = |_: &Value| Ok(());
+        let refused = || {
+            let error = ours.kept("runs", 0, any).unwrap_err().to_string();
+            assert!(
+                error.contains("runs/0000.json") && error.contains("remove it"),
+                "{error}"
+            );
+            error
+        };
+        for folder in [&ours, &theirs] {
+            folder
+                .keep("runs", 0, &json!({ "x": 0.1, "verdict": "no-gap" }))
+                .unwrap();
+        }
+        let file = ours.file("runs/0000.json");
+        let text = fs::read_to_string(&file).unwrap();
+        fs::write(&file, text.replace("no-gap", "structural-gap")).unwrap();
+        assert!(refused().contains("does not match its checksum"));
+        fs::copy(theirs.file("runs/0000.json"), &file).unwrap();
+        assert!(refused().contains("does not match its checksum"));
+        fs::write(&file, "{ \"x\": 0.1 }").unwrap();
+        assert!(refused().contains("it has no checksum"));
+        fs::write(&file, text).unwrap();
+        assert!(ours.kept("runs", 0, any).unwrap().is_some());
     }
 
     #[cfg(unix)]
@@ -272,8 +318,9 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("work");
         open(&path, 2).unwrap();
-        let left = [place.path().join(".truetwin-a"), path.join(".truetwin-b")];
-        let in_part = path.join("runs/.truetwin-c");
+        let name = ".truetwin-unfinished-4711-a1B2c3";
+        let left = [place.path().join(name), path.join(name)];
+        let in_part = path.join("runs").join(name);
         for file in left.iter().chain([&in_part]) {
             fs::write(file, "half").unwrap();
         }
@@ -321,7 +368,7 @@ mod tests {
         let manifest = Manifest::new("pretrain", 1);
         let open = || {
             let path = place.path().join("work");
-            WorkFolder::open::<StorageError>(&path, &manifest, &[], |_| Ok(())).unwrap()
+            WorkFolder::open::<StorageError>(&path, &manifest, &[], |_| Ok(None)).unwrap()
         };
         let first = open().lock().unwrap();
         let refused = open().lock().unwrap_err();
@@ -336,7 +383,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let manifest = Manifest::new("pretrain", 1);
         let path = place.path().join("work");
-        let folder = WorkFolder::open::<StorageError>(&path, &manifest, &[], |_| Ok(())).unwrap();
+        let folder = WorkFolder::open::<StorageError>(&path, &manifest, &[], |_| Ok(None)).unwrap();
         let elsewhere = place.path().join("elsewhere");
         std::os::unix::fs::symlink(&elsewhere, folder.file("lock")).unwrap();
         assert!(folder.lock().is_err());

@@ -1,12 +1,13 @@
 //! Manifest of a work folder: everything that a call must repeat to resume it.
 
 use crate::storage::StorageError;
-use crate::storage::files::{sha256, sha256_of};
+use crate::storage::checksum::{sha256, sha256_of};
+use crate::storage::reading::checksum_of_read;
 use crate::storage::untrusted::excerpt;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// Entry that a finished folder has in addition.
+/// Entry that a folder has in addition: of pieces, once it is finished, or of what it was filled with.
 pub(super) const CHECKSUMS: &str = "checksums";
 /// Longest value that a message shows, in characters.
 const SHORT: usize = 40;
@@ -105,9 +106,11 @@ fn shown(value: Option<&Value>) -> String {
     }
 }
 
-/// Returns the SHA-256 of a file that pieces depend on, in hexadecimal digits.
+/// Returns the SHA-256 of a file that pieces depend on, in hexadecimal digits: as it was read, or as it is.
 pub fn checksum(path: &Path) -> Result<String, StorageError> {
-    sha256_of(path).map_err(|error| StorageError::io(path, error))
+    checksum_of_read(path)
+        .map_or_else(|| sha256_of(path), Ok)
+        .map_err(|error| StorageError::io(path, error))
 }
 
 #[cfg(test)]

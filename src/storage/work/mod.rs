@@ -10,6 +10,7 @@
 
 mod folder;
 mod manifest;
+mod piece;
 mod pieces;
 mod ranks;
 mod share;

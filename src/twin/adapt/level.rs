@@ -94,7 +94,11 @@ impl NoiseLevel {
     /// Checks numbers of the level of `name`, a state or an output.
     pub(super) fn check(self, name: &str, is_process: bool) -> Result<(), TwinError> {
         let Self::Declared(DeclaredNoise {
-            std, share, factor, ..
+            std,
+            share,
+            factor,
+            known,
+            ..
         }) = self
         else {
             return Ok(());
@@ -121,6 +125,11 @@ impl NoiseLevel {
         }
         if !(factor > 1.0 && factor.is_finite()) {
             let remedy = "factor is how many times larger or smaller the level may well be: above 1, such as 2";
+            return Err(wrong(factor, remedy));
+        }
+        if known && !is_usual_factor(&factor) {
+            let remedy =
+                "a known level is not fitted, and has no factor; remove one of known and factor";
             return Err(wrong(factor, remedy));
         }
         Ok(())

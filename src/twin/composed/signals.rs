@@ -361,5 +361,6 @@ pub(crate) const LONGEST_DEAD_TIME: usize = 63;
 fn whole_samples(delay: f64, dt: f64) -> usize {
     (delay / dt - 0.37)
         .floor()
-        .clamp(0.0, LONGEST_DEAD_TIME as f64) as usize
+        .max(0.0)
+        .min(LONGEST_DEAD_TIME as f64) as usize
 }

@@ -17,6 +17,7 @@ mod tests;
 
 pub(crate) use step::{check_step, coarse_step};
 
+use crate::math::thin_svd;
 use crate::record::{Drive, Signal};
 use crate::twin::{
     DigitalTwin, Noise, PRIOR_DEVIATION, Parameter, ParameterSpace, SimulationError, combination,
@@ -26,6 +27,8 @@ use serde::Serialize;
 
 /// Relative size under which a singular value counts as zero: this direction does not move the free run.
 const FLAT: f64 = 1e-6;
+/// Finding about outputs whose squares overflow.
+const TOO_LARGE: &str = "not known: the outputs are too large to compute with; use larger units";
 /// Noise draws of nearby parameters must agree to this part of their spread.
 const PAIRED: f64 = 1e-2;
 
@@ -249,6 +252,7 @@ impl Setting<'_> {
             Ok(change) if change <= PAIRED * spread || spread == 0.0 => {
                 Ok("noise draws do not depend on θ".into())
             }
+            Ok(change) if !change.is_finite() => warned(TOO_LARGE),
             Ok(change) => failed(format!(
                 "1e-9 of the prior's width moves the outputs by {change:.1e} rms (noise: {spread:.1e}): draws depend on θ; open each source of noise by its own name and draw the same number of times"
             )),
@@ -263,15 +267,17 @@ impl Setting<'_> {
             Ok(jacobian) => jacobian,
             Err(error) => return warned(format!("not known: {error}")),
         };
-        let svd = jacobian.svd(false, true);
-        let largest = svd.singular_values.max();
+        let Some(svd) = thin_svd(&jacobian) else {
+            return warned(TOO_LARGE);
+        };
+        let largest = svd.values.max();
         // Standard deviation of the direction if the noise were white, in prior widths.
         let deviation = |s: f64| spread / 2f64.sqrt() / s;
         let named = |weak: &dyn Fn(f64) -> bool| -> Vec<String> {
-            let chosen = (svd.singular_values.iter().enumerate()).filter(|(_, s)| weak(**s));
-            let words = chosen.filter_map(|(i, _)| {
-                let row = svd.v_t.as_ref()?.row(i).transpose();
-                Some(combination(&self.space.names(), row.as_slice()))
+            let chosen = (svd.values.iter().enumerate()).filter(|(_, s)| weak(**s));
+            let words = chosen.map(|(i, _)| {
+                let direction = svd.right.column(i).into_owned();
+                combination(&self.space.names(), direction.as_slice())
             });
             words.collect()
         };
@@ -289,7 +295,7 @@ impl Setting<'_> {
                 drowned.join("; ")
             ));
         }
-        let weakest = deviation(svd.singular_values.min());
+        let weakest = deviation(svd.values.min());
         Ok(format!(
             "every direction moves the free run (the weakest is known to about {weakest:.1e} prior widths)"
         ))

@@ -91,7 +91,7 @@ fn links_out_of_a_folder_are_not_followed() {
     let elsewhere = place.path().join("elsewhere");
     fs::rename(&shards, &elsewhere).unwrap();
     fs::remove_file(&files(&elsewhere)[0]).unwrap();
-    fs::write(elsewhere.join(".truetwin-not-ours"), "").unwrap();
+    fs::write(elsewhere.join(".truetwin-unfinished-4711-a1B2c3"), "").unwrap();
     symlink(&elsewhere, &shards).unwrap();
     let before = files(&elsewhere);
     let line = refused(place.path(), &BANK);

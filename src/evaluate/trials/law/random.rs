@@ -2,6 +2,7 @@
 
 use super::functions::{Tree, Waves};
 use super::{DeparturePlace, Moment};
+use crate::math::nearest;
 use crate::twin::{Noise, Source};
 use serde::de::IntoDeserializer;
 use serde::de::value::Error as ValueError;
@@ -175,7 +176,7 @@ impl RandomLaw {
             memory.push(z);
         }
         match self.family.shape {
-            LawShape::Hysteretic => memory[0] = memory[0].clamp(z - self.keeps, z + self.keeps),
+            LawShape::Hysteretic => memory[0] = nearest(memory[0], z - self.keeps, z + self.keeps),
             LawShape::Memory => memory[0] += (1.0 - (-dt / self.keeps).exp()) * (z - memory[0]),
             LawShape::Smooth | LawShape::Kinked => {}
         }

@@ -2,6 +2,7 @@
 
 use super::above;
 use crate::evaluate::trials::numbers::TRIAL;
+use crate::math::nearest;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -92,11 +93,11 @@ impl SignalDeparture {
             }
             Self::Play { width, compliance } => follow(memory, v, |z, _| {
                 let half = 0.5 * width;
-                z + (1.0 - compliance) * (z.clamp(v - half, v + half) - z)
+                z + (1.0 - compliance) * (nearest(z, v - half, v + half) - z)
             }),
             Self::RateLimit { rate, knee } => follow(memory, v, |z, _| {
                 let most = rate * dt;
-                let hard = (v - z).clamp(-most, most);
+                let hard = nearest(v - z, -most, most);
                 z + (1.0 - knee) * hard + knee * most * ((v - z) / most).tanh()
             }),
         }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::diagnose::Ablation;
-use crate::storage::files::sha256;
+use crate::storage::checksum::sha256;
 use crate::study::{RecordPlan, StudyFile};
 use crate::twins::VanDerPol;
 use std::fs;
@@ -62,6 +62,26 @@ fn trials_are_gone_on_with_and_keys_stay_as_they_were_sealed() {
     assert!(error.contains("SHA-256"), "{error}");
     // The answer was given before the key was looked at.
     assert!(answer.exists());
+    // A verdict in an answer, a record without its answer.
+    fs::write(path.join("keys.json"), keys).unwrap();
+    let text = fs::read_to_string(&answer).unwrap();
+    let other = text.replace("\"seconds\": ", "\"seconds\": 1");
+    assert_ne!(other, text);
+    fs::write(&answer, other).unwrap();
+    let error = score().unwrap_err().to_string();
+    assert!(
+        error.contains("0001.json") && error.contains("checksum"),
+        "{error}"
+    );
+    fs::remove_file(&answer).unwrap();
+    let record = path.join("records/0001.csv");
+    let text = fs::read_to_string(&record).unwrap();
+    fs::write(&record, text.replacen(",0.", ",1.", 3)).unwrap();
+    let error = score().unwrap_err().to_string();
+    assert!(
+        error.contains("records/0001.csv") && error.contains("SHA-256"),
+        "{error}"
+    );
 }
 
 #[test]

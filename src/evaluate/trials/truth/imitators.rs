@@ -14,6 +14,7 @@ use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::law::DeparturePlace;
 use crate::evaluate::trials::listed::{ListedLaw, Sign, Variant};
 use crate::evaluate::trials::places::TwinPlaces;
+use crate::math::nearest;
 use crate::study::Study;
 
 /// An effect is a right answer if it leaves less than this share of the information, and less than this in nats.
@@ -151,7 +152,7 @@ impl Comparison<'_> {
                 true => FIRST * (information.nats(&self.sized.change) / nats).sqrt(),
                 false => 10.0 * FIRST,
             };
-            let same = same.clamp(0.1 * FIRST, largest);
+            let same = nearest(same, 0.1 * FIRST, largest);
             let large = experiment.changed(&best.draft, same)?;
             let large = large.map(|large| information.matched(&self.sized.change, &large));
             if let Some(large) = large.filter(|large| large.multiple > 0.0)

@@ -89,7 +89,9 @@ fn simulated(
         .collect::<Option<Vec<Signal>>>()?;
     let (rows, columns) = runs[0].dim();
     Some(Signal::from_shape_fn((rows, columns), |(k, j)| {
-        let place = ((values[k] - low) / step).clamp(0.0, (TRIAL.parameter_values - 1) as f64);
+        let place = ((values[k] - low) / step)
+            .max(0.0)
+            .min((TRIAL.parameter_values - 1) as f64);
         let m = (place as usize).min(TRIAL.parameter_values - 2);
         let share = place - m as f64;
         (1.0 - share) * runs[m][[k, j]] + share * runs[m + 1][[k, j]]

@@ -3,6 +3,7 @@
 use super::{RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, Moment, above};
 use crate::evaluate::trials::numbers::TRIAL;
+use crate::math::nearest;
 use crate::record::{Drive, Signal};
 use crate::twin::{Acting, Between, Composed, DeadTime, Interval, Noise, Now};
 use ndarray::ArrayView1;
@@ -44,7 +45,7 @@ pub(super) fn run(
             && k > 0
         {
             let wanted = command[0] + feedback.gain * (feedback.setpoint - outputs[[k - 1, 0]]);
-            command[0] = wanted.clamp(feedback.low, feedback.high);
+            command[0] = nearest(wanted, feedback.low, feedback.high);
             inputs[[k, 0]] = command[0];
         }
         let moment = Moment::new(t, &x, &command);

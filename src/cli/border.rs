@@ -1,0 +1,81 @@
+//! The border of the program: a fault in it is one line and exit code 1, and costs no answer that was found before.
+
+use super::failure::Failure;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook};
+use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
+
+/// Place of the first fault, file and line.
+static PLACE: Mutex<Option<String>> = Mutex::new(None);
+
+/// Notes where a fault is, in place of a trace of it on standard error.
+pub(super) fn keep_quiet() {
+    set_hook(Box::new(|fault| {
+        let mut place = PLACE.lock().unwrap_or_else(PoisonError::into_inner);
+        if let (None, Some(at)) = (&*place, fault.location()) {
+            *place = Some(format!("{}:{}", at.file(), at.line()));
+        }
+    }));
+}
+
+/// Does work; a fault in it is a failure.
+pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    // Nothing of the work is looked at after a fault.
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|fault| Err(failure(&*fault)))
+}
+
+/// Writes the files of a result and prints it: printed it is also where it cannot be written, and the code of the failure is the call's.
+pub(super) fn deliver(
+    write: impl FnOnce() -> Result<(), Failure>,
+    print: impl FnOnce() -> Result<ExitCode, Failure>,
+) -> Result<ExitCode, Failure> {
+    let written = guarded(write);
+    let printed = guarded(print);
+    written.and(printed)
+}
+
+fn failure(fault: &(dyn Any + Send)) -> Failure {
+    let text = (fault.downcast_ref::<&str>().copied())
+        .or_else(|| fault.downcast_ref::<String>().map(String::as_str));
+    let place = PLACE.lock().unwrap_or_else(PoisonError::into_inner);
+    let at = place
+        .as_ref()
+        .map_or(String::new(), |at| format!(" at {at}"));
+    Failure::internal(format!(
+        "a fault of this program{at} ({}); please report this line with the call and its files",
+        text.unwrap_or("no message")
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn a_fault_is_one_failure_with_its_message() {
+        let failed = guarded(|| -> Result<(), Failure> { panic!("min > max") }).unwrap_err();
+        assert_eq!(failed.code(), 1);
+        assert!(
+            format!("{failed:?}").contains("(min > max); please report"),
+            "{failed:?}"
+        );
+        assert!(guarded(|| Ok(())).is_ok());
+    }
+
+    /// The answer is printed whatever becomes of its files; then the failure is told.
+    #[test]
+    fn an_answer_is_printed_though_its_files_fail() {
+        let printed = Cell::new(0);
+        let print = || {
+            printed.set(printed.get() + 1);
+            Ok(ExitCode::SUCCESS)
+        };
+        let full = deliver(|| Err(Failure::user("no room")), print).unwrap_err();
+        assert_eq!((full.code(), printed.get()), (2, 1));
+        let fault = deliver(|| panic!("a picture"), print).unwrap_err();
+        assert_eq!((fault.code(), printed.get()), (1, 2));
+        assert!(deliver(|| Ok(()), print).is_ok());
+    }
+}

@@ -1,0 +1,218 @@
+//! Names and places that a system allows: bytes that are no text, pipes, links to nothing, a user's own dotfiles, places that are taken
+//! while the work goes on. No answer is lost to them.
+
+use std::ffi::{OsStr, OsString};
+use std::fs;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+const TRUETWIN: &str = env!("CARGO_BIN_EXE_truetwin");
+
+fn call<'a>(folder: &Path, words: &str, more: impl IntoIterator<Item = &'a OsStr>) -> Output {
+    let mut command = Command::new(TRUETWIN);
+    command.args(words.split_whitespace()).args(more);
+    command.current_dir(folder).output().unwrap()
+}
+
+fn run(folder: &Path, words: &str) -> Output {
+    call(folder, words, [])
+}
+
+/// A folder with a short record of the oscillator and its study.
+fn with_record() -> tempfile::TempDir {
+    let place = tempfile::tempdir().unwrap();
+    crate::stop::short(place.path());
+    let made = run(
+        place.path(),
+        "simulate --study short.toml --theta nu=1 --out r.csv",
+    );
+    assert!(made.status.success(), "{made:?}");
+    place
+}
+
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn json(output: &Output) -> serde_json::Value {
+    assert!(output.status.success(), "{}", told(output));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// A Latin-1 name: the answer has it with a replacement character, its call with the very bytes.
+#[test]
+fn names_are_bytes() {
+    let place = with_record();
+    let at = place.path();
+    let name = OsString::from(OsStr::from_bytes(b"Messung_f\xfcr.csv"));
+    if fs::copy(at.join("r.csv"), at.join(&name)).is_err() {
+        return;
+    }
+    for verb in ["fit", "check"] {
+        let words = format!("{verb} --study short.toml --json");
+        let answer = json(&call(at, &words, [&*name]));
+        let provenance = &answer["provenance"];
+        let files = provenance["files"].as_array().unwrap();
+        let record = files.iter().find(|file| file["role"] == "record").unwrap();
+        assert_eq!(record["path"], "Messung_f\u{fffd}r.csv");
+        assert_eq!(record["sha256"].as_str().unwrap().len(), 64);
+        let said = provenance["call"].as_str().unwrap();
+        assert!(said.contains(r"$'Messung_f\374r.csv'"), "{said}");
+    }
+    let out = OsString::from(OsStr::from_bytes(b"\xfc.csv"));
+    for words in [
+        "simulate --study short.toml --theta nu=1 --json --out",
+        "resample r.csv --step 0.1 --json --out",
+    ] {
+        let answer = json(&call(at, words, [&*out]));
+        assert_eq!(answer["record"], "\u{fffd}.csv", "{words}");
+        fs::remove_file(at.join(&out)).unwrap();
+    }
+    let study = OsString::from(OsStr::from_bytes(b"\xe9tude.toml"));
+    fs::copy(at.join("short.toml"), at.join(&study)).unwrap();
+    json(&call(at, "fit r.csv --json --study", [&*study]));
+}
+
+/// A pipe works once, and its checksum is that of the bytes that came through it.
+#[test]
+fn pipes_are_read_once() {
+    let place = with_record();
+    let at = place.path();
+    let made = Command::new("mkfifo").arg(at.join("pipe")).status();
+    assert!(made.unwrap().success());
+    let feed = |from: &'static str, to: &'static str| {
+        let (from, to) = (at.join(from), at.join(to));
+        std::thread::spawn(move || fs::copy(from, to).map(drop))
+    };
+    let direct = json(&run(at, "fit r.csv --study short.toml --json"));
+    let sum = |answer: &serde_json::Value| {
+        let files = answer["provenance"]["files"].as_array().unwrap();
+        let record = files.iter().find(|file| file["role"] == "record").unwrap();
+        record["sha256"].clone()
+    };
+    let writer = feed("r.csv", "pipe");
+    let piped = json(&run(at, "fit pipe --study short.toml --json"));
+    writer.join().unwrap().unwrap();
+    assert_eq!(sum(&piped), sum(&direct));
+    let mut command = Command::new(TRUETWIN);
+    command.args("fit /dev/stdin --study short.toml --json".split(' '));
+    command.current_dir(at).stdin(Stdio::piped());
+    let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+    let bytes = fs::read(at.join("r.csv")).unwrap();
+    std::io::Write::write_all(&mut child.stdin.take().unwrap(), &bytes).unwrap();
+    assert_eq!(sum(&json(&child.wait_with_output().unwrap())), sum(&direct));
+    let writer = feed("r.csv", "pipe");
+    let twice = run(at, "fit pipe pipe --study short.toml");
+    writer.join().unwrap().unwrap();
+    assert_eq!(twice.status.code(), Some(2));
+    assert!(
+        told(&twice).contains("pipe: it is a pipe, which can be read once"),
+        "{}",
+        told(&twice)
+    );
+}
+
+/// What begins as our unfinished files do, and is a user's.
+#[test]
+fn dotfiles_of_users_stay() {
+    let place = with_record();
+    let at = place.path();
+    fs::create_dir(at.join(".truetwin-cache")).unwrap();
+    fs::copy(at.join("short.toml"), at.join(".truetwin-study.toml")).unwrap();
+    let made = run(
+        at,
+        "simulate --study .truetwin-study.toml --theta nu=1 --out s.csv",
+    );
+    assert!(made.status.success(), "{}", told(&made));
+    assert!(at.join(".truetwin-cache").exists() && at.join(".truetwin-study.toml").exists());
+    for call in [
+        "simulate --study short.toml --theta nu=1 --out .truetwin-s.csv",
+        "fit r.csv --study short.toml --out .truetwin-gap",
+        "bank --study short.toml --size 8 --out .truetwin-bank",
+        "pretrain --study short.toml --out .truetwin-est",
+    ] {
+        let refused = run(at, call);
+        assert_eq!(refused.status.code(), Some(2), "{call}");
+        assert!(
+            told(&refused).contains("choose another name"),
+            "{}",
+            told(&refused)
+        );
+    }
+}
+
+#[test]
+fn links_to_nothing_are_told_as_such() {
+    let place = with_record();
+    let at = place.path();
+    symlink("/nowhere/at/all", at.join("link")).unwrap();
+    for call in [
+        "fit link --study short.toml",
+        "fit r.csv --study link",
+        "fit r.csv --study short.toml --out link",
+        "simulate --study short.toml --theta nu=1 --out link",
+    ] {
+        let refused = run(at, call);
+        assert_eq!(refused.status.code(), Some(2), "{call}");
+        let text = told(&refused);
+        assert!(text.contains("a link to /nowhere/at/all"), "{call}: {text}");
+    }
+}
+
+/// `out/.` is `out`; a file whose place names a folder is refused before the work.
+#[test]
+fn places_with_a_dot_at_their_end() {
+    let place = with_record();
+    let at = place.path();
+    let made = run(at, "fit r.csv --study short.toml --out result/.");
+    assert!(made.status.success(), "{}", told(&made));
+    assert!(at.join("result/fit.json").exists());
+    for out in ["s.csv/", "s.csv/."] {
+        let call = format!("simulate --study short.toml --theta nu=1 --out {out}");
+        let refused = run(at, &call);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(told(&refused).contains("name a file"), "{}", told(&refused));
+    }
+    let long = "a".repeat(255);
+    let made = run(at, &format!("fit r.csv --study short.toml --out {long}"));
+    assert!(made.status.success(), "{}", told(&made));
+}
+
+/// The place is taken while the work goes on: the answer is printed, its files are beside, and the exit code says so.
+#[test]
+fn an_answer_outlives_its_place() {
+    let place = with_record();
+    let at = place.path();
+    let mut command = Command::new(TRUETWIN);
+    let words = "fit r.csv --study short.toml --out o --json --draws 2000";
+    command.args(words.split(' ')).current_dir(at);
+    let child = (command.stdout(Stdio::piped()).stderr(Stdio::piped()))
+        .spawn()
+        .unwrap();
+    let is_begun = || {
+        let names = fs::read_dir(at).unwrap().map(|e| e.unwrap().file_name());
+        names
+            .into_iter()
+            .any(|n| n.to_string_lossy().starts_with(".truetwin-unfinished-"))
+    };
+    while !is_begun() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    fs::write(at.join("o"), "another's").unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(
+        answer["parameters"].is_array() || answer["parameters"].is_object(),
+        "{answer}"
+    );
+    assert!(
+        told(&output).contains("the result is in o-2"),
+        "{}",
+        told(&output)
+    );
+    assert!(at.join("o-2/fit.json").exists());
+    assert_eq!(fs::read(at.join("o")).unwrap(), b"another's");
+}
