@@ -40,7 +40,8 @@ impl Verb for Simulate {
         if let Some(out) = &self.out {
             output::check_new_file(out)?;
         }
-        self.columns.check_used(self.input.is_some(), "--input U.csv")?;
+        self.columns
+            .check_used(self.input.is_some(), "--input U.csv")?;
         let study = context.study(&self.subject)?;
         let given = parse_theta(&self.theta)?;
         let mut twin = study.twin().clone();
