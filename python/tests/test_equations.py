@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 import truetwin
 
@@ -21,6 +23,27 @@ def test_keywords_are_a_file() -> None:
     text = truetwin.Twin(**TANK).toml()
     for line in ['name = "tank"', "k = { prior = [0.2, 1.0] }", 'h = { rate = "u - k*h", start = 0.0, unit = "m" }', "noise = 0.02"]:
         assert line in text
+
+
+def test_each_input_may_have_its_plan(tmp_path: Path) -> None:
+    (tmp_path / "w.csv").write_text("t,w\n0,1\n0.1,2\n0.2,4\n", encoding="utf-8")
+    three = {
+        **TANK,
+        "inputs": {"u": "m/s", "v": "m/s", "w": "m/s"},
+        "states": {"h": {"rate": "u + v + w - k*h", "start": 0.0}},
+        "samples": 3,
+        "levels": {"u": {"levels": (0, 1), "hold": 3}, "v": 60, "w": tmp_path / "w.csv"},
+    }
+    twin = truetwin.Twin(**three)
+    assert "u = { levels = [0.0, 1.0], hold = 3 }, v = 60.0, w = " in twin.toml()
+    record = twin.simulate({"k": 0.6})
+    assert len(set(record["u"])) == 1 and 0 <= record["u"][0] <= 1
+    assert list(record["v"]) == [60.0] * 3 and list(record["w"]) == [1.0, 2.0, 4.0]
+    with pytest.raises(truetwin.TruetwinError, match="w has no plan"):
+        truetwin.Twin(**{**three, "levels": {"u": (0, 1), "v": 60}}).simulate({"k": 0.6})
+    for wrong in ({"u": (0, 1, 2)}, {"u": True}, {"u": None}, {"u": {"low": 0}}):
+        with pytest.raises(ValueError, match="levels: u .*give"):
+            truetwin.Twin(**{**TANK, "levels": wrong})
 
 
 def test_a_fit_of_equations() -> None:

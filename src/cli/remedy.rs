@@ -139,7 +139,7 @@ impl Remedy for StudyError {
                 "`truetwin effects --twin T` lists those of a twin".into()
             }
             Self::NoInput(_) => {
-                "[record] input = { levels = [low, high], hold = n }, or a file, in the study file"
+                "[record] input = { levels = [low, high], hold = n }, a file, or a plan for each input, in the study file"
                     .into()
             }
             Self::NoPlan => "[record] step, samples and input of the study file".into(),

@@ -242,6 +242,79 @@ impl Columns {
     }
 }
 
+/// Columns of a file that are read.
+#[derive(Clone, Copy)]
+pub(super) enum Wanted<'a> {
+    /// Those of a record of a twin with these channels, if they are known.
+    Record(&'a Columns, Option<&'a Signals>),
+    /// The time, and the input that has the first of these names in the file; none where there are no names.
+    Input(&'a [&'a str]),
+}
+
+impl Wanted<'_> {
+    /// Returns `true` if no column is given another name.
+    pub fn is_usual(self) -> bool {
+        match self {
+            Self::Record(columns, _) => columns.is_empty(),
+            Self::Input(_) => true,
+        }
+    }
+
+    /// Number of outputs of the twin; 0 where it is unknown.
+    pub fn outputs(self) -> usize {
+        match self {
+            Self::Record(_, Some(signals)) => signals.outputs.len(),
+            _ => 0,
+        }
+    }
+
+    /// Translates a header into the usual names, `None` for a column that is left out.
+    pub fn usual_names(self, header: &[&str]) -> Result<Vec<Option<String>>, String> {
+        let names = match self {
+            Self::Record(columns, signals) => return columns.usual_names(header, signals),
+            Self::Input(names) => names,
+        };
+        let input = match names.first() {
+            Some(name) => Some(input_column(header, names, name)?),
+            None => None,
+        };
+        let usual = |(at, column): (usize, &&str)| match *column {
+            _ if Some(at) == input => Some("u".to_owned()),
+            "t" => Some("t".to_owned()),
+            _ => None,
+        };
+        Ok(header.iter().enumerate().map(usual).collect())
+    }
+}
+
+/// Index of the column of an input: the first of `names` that a column has, or the only column that is neither time nor output.
+fn input_column(header: &[&str], names: &[&str], own: &str) -> Result<usize, String> {
+    let at = |name: &&str| header.iter().position(|column| column == name);
+    if let Some(at) = names.iter().find_map(at) {
+        return match header[at + 1..].contains(&header[at]) {
+            false => Ok(at),
+            true => Err(format!(
+                "column \"{}\" appears twice; rename or remove one",
+                quoted(header[at])
+            )),
+        };
+    }
+    let is_output = |column: &str| is_usual(column) && column.starts_with('y');
+    let inputs: Vec<usize> = (0..header.len())
+        .filter(|at| header[*at] != "t" && !is_output(header[*at]))
+        .collect();
+    match inputs[..] {
+        [at] => Ok(at),
+        _ => Err(format!(
+            "no column is called \"{}\"{}; the columns are {}: rename one to {}",
+            quoted(own),
+            did_you_mean(own, header),
+            excerpt(&header.join(", ")),
+            quoted(own)
+        )),
+    }
+}
+
 /// Parses `t=time,u=pump,y=level`.
 impl FromStr for Columns {
     type Err = String;

@@ -4,7 +4,7 @@
 //! names by [`Columns`]. Columns are separated by commas, semicolons or tabs. An output that was not measured is an empty cell, `nan` or
 //! `NA`; its column may be left out where the twin is known. Steps that are the same to 1e-3 count as one. Rows of one time are replicates. Rows are counted as an editor counts lines: the header is row 1.
 
-use super::channels::{Columns, columns, header};
+use super::channels::{Columns, Wanted, columns, header};
 use super::parquet;
 use super::table::Table;
 use super::text::Text;
@@ -50,7 +50,8 @@ impl Drive {
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
 pub fn parse_record(text: &str, path: &Path) -> Result<Record, RecordError> {
     let text = Text::own(text.as_bytes());
-    Table::parse(text, path, &Columns::default(), None, &mut 0)?.record(path)
+    let wanted = Wanted::Record(&Columns::default(), None);
+    Table::parse(text, path, wanted, &mut 0)?.record(path)
 }
 
 /// Reads the files of one call: their columns have the same names, and all of them together have a limit.
@@ -84,7 +85,7 @@ impl RecordReader {
     /// Reads a measured record.
     pub fn record(&mut self, path: &Path) -> Result<Record, RecordError> {
         let columns = self.columns.clone();
-        let record = self.read(path, &columns)?.record(path)?;
+        let record = self.channels(path, &columns)?.record(path)?;
         if let Some((twin, signals)) = self.twin.as_ref().zip(self.signals.as_ref()) {
             (record.check_channels(signals)).map_err(|error| error.of_twin(twin).within(path))?;
         }
@@ -94,23 +95,32 @@ impl RecordReader {
     /// Reads time and inputs; columns of outputs are refused.
     pub fn drive(&mut self, path: &Path) -> Result<Drive, RecordError> {
         let columns = self.columns.without_outputs(self.signals.as_ref());
-        self.read(path, &columns)?.drive(path)
+        self.channels(path, &columns)?.drive(path)
     }
 
-    fn read(&mut self, path: &Path, columns: &Columns) -> Result<Table, RecordError> {
-        let signals = self.signals.as_ref();
-        let read = &mut self.read;
-        if path.extension().is_some_and(|e| e == "parquet") {
-            return parquet::with_rows(path, |rows| {
-                Table::parse(Text::own(rows), path, columns, signals, read)
-            });
-        }
-        let wrong = |error| RecordError::io(path, error);
-        let file = Reading::open(path).map_err(wrong)?;
-        let text = Text::open(file).map_err(wrong)?;
-        let text = text.map_err(|problem| RecordError::file(path, problem))?;
-        Table::parse(text, path, columns, signals, read)
+    /// Reads time and one input: the column with the first of these names that the file has, or its only column that is no output. Without
+    /// names, the time alone.
+    pub fn input(&mut self, path: &Path, names: &[&str]) -> Result<Drive, RecordError> {
+        table(path, Wanted::Input(names), &mut self.read)?.drive(path)
     }
+
+    fn channels(&mut self, path: &Path, columns: &Columns) -> Result<Table, RecordError> {
+        let wanted = Wanted::Record(columns, self.signals.as_ref());
+        table(path, wanted, &mut self.read)
+    }
+}
+
+fn table(path: &Path, wanted: Wanted<'_>, read: &mut usize) -> Result<Table, RecordError> {
+    if path.extension().is_some_and(|e| e == "parquet") {
+        return parquet::with_rows(path, |rows| {
+            Table::parse(Text::own(rows), path, wanted, read)
+        });
+    }
+    let wrong = |error| RecordError::io(path, error);
+    let file = Reading::open(path).map_err(wrong)?;
+    let text = Text::open(file).map_err(wrong)?;
+    let text = text.map_err(|problem| RecordError::file(path, problem))?;
+    Table::parse(text, path, wanted, read)
 }
 
 /// The text of an input file for a twin with these channels.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 pub type Signal = Array2<f64>;
 
 /// Steps that differ by less than this share of the step count as one.
-const UNIFORM: f64 = 1e-3;
+pub(crate) const UNIFORM: f64 = 1e-3;
 
 /// Time grid and inputs of one experiment, each input held over a step. All steps are Δt, unless times are given.
 ///

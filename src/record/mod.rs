@@ -21,6 +21,7 @@ mod text;
 pub(crate) use channels::{Columns, column_names};
 pub use channels::{Quantity, Signals};
 pub(crate) use csv::{RecordReader, drive_csv_text, parse_record, record_csv_text, twin_csv_text};
+pub(crate) use drive::UNIFORM;
 pub use drive::{Drive, Signal};
 pub use error::RecordError;
 pub use measured::Record;

@@ -1,6 +1,6 @@
 //! The numbers of a record file, checked cell by cell.
 
-use super::channels::{Columns, Signals, column_names, columns, is_usual};
+use super::channels::{Wanted, column_names, columns, is_usual};
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};
 use crate::record::{Drive, Record, RecordError, Signal};
@@ -54,8 +54,7 @@ impl Table {
     pub fn parse(
         text: Text<'_>,
         path: &Path,
-        columns: &Columns,
-        signals: Option<&Signals>,
+        wanted: Wanted<'_>,
         read: &mut usize,
     ) -> Result<Self, RecordError> {
         let separator = text.separator;
@@ -73,15 +72,13 @@ impl Table {
             )));
         }
         let header: Vec<&str> = header.iter().collect();
-        if columns.is_empty() {
+        if wanted.is_usual() {
             check_header(&header).map_err(|problem| RecordError::file(path, problem))?;
         }
-        let usual = columns.usual_names(&header, signals);
-        let (usual, inputs, outputs) = usual
+        let (usual, inputs, outputs) = (wanted.usual_names(&header))
             .and_then(|usual| {
                 let names: Vec<&str> = usual.iter().flatten().map(String::as_str).collect();
-                let twin = signals.map_or(0, |signals| signals.outputs.len());
-                let (inputs, outputs) = channels(&names, twin)?;
+                let (inputs, outputs) = channels(&names, wanted.outputs())?;
                 Ok((usual, inputs, outputs))
             })
             .map_err(|problem| RecordError::Columns {

@@ -3,13 +3,13 @@
 use crate::effect::EffectEntry;
 use crate::equations::{self, Equations};
 use crate::feature::FeatureRecipe;
-use crate::record::Drive;
+use crate::record::UNIFORM;
 use crate::setting::number;
 use crate::storage::files::folder;
 use crate::storage::untrusted::{check_names, message, read_text};
 use crate::study::error::StudyError;
 use crate::study::noise_table::NoiseTable;
-use crate::study::plan::InputPlan;
+use crate::study::plan::grid_of_files;
 use crate::study::tables::{Library, PriorTable, RecordTable, check_shapes, dotted};
 use crate::twin::{Interval, StartLevel, TwinError};
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ const MOST: u64 = 1 << 20;
 /// [record]
 /// step = 4.0
 /// samples = 1024
-/// input = { levels = [0.5, 6.0], hold = 25 }   # or a file: "U.csv"
+/// input = { levels = [0.5, 6.0], hold = 25 }   # or a file: "U.csv"; or a plan for each input: { u = 2.0 }
 /// hold = "linear"   # inputs on the line between samples; "nearest" holds the nearest, "zero" the last
 /// integrator = "runge-kutta-4"   # or "euler"
 /// substeps = 4      # steps of the integrator within a sample
@@ -117,11 +117,14 @@ impl StudyFile {
         })?;
         let mut file = Self::parse(&text, path)?;
         let record = &mut file.record;
-        if let Some(InputPlan::File(input)) = &mut record.input {
-            *input = folder(path).join(&*input);
-            let drive = Drive::read(input)?;
-            let (step, samples) = (drive.dt(), drive.samples());
-            let other = record.step.is_some_and(|s| (s - step).abs() > 1e-3 * step)
+        if let Some(input) = &mut record.input {
+            input.change_files(|file| *file = folder(path).join(&*file));
+        }
+        let grid = record.input.as_ref().map(grid_of_files).transpose()?;
+        if let Some((input, step, samples)) = grid.flatten() {
+            let other = record
+                .step
+                .is_some_and(|s| (s - step).abs() > UNIFORM * step)
                 || record.samples.is_some_and(|n| n != samples);
             if other {
                 return Err(StudyError::Plan(format!(
@@ -303,6 +306,35 @@ mod tests {
         }
     }
 
+    /// Files are looked for beside the study; the text that is kept finds them again.
+    #[test]
+    fn a_plan_for_each_input_is_written_again_with_its_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("w.csv"), "t,w\n0,1\n0.5,2\n1,3\n").unwrap();
+        let text = "twin = 'tanks'\n[record.input]\nu1 = { levels = [0, 1], hold = 2 }\nu2 = 60.0\nw = 'w.csv'\n";
+        std::fs::write(at("s.toml"), text).unwrap();
+        let file = StudyFile::read(&at("s.toml")).unwrap();
+        assert_eq!(
+            (file.record.step, file.record.samples),
+            (Some(0.5), Some(3))
+        );
+        let again = parse(&file.written().unwrap()).unwrap();
+        assert_eq!(again.record, file.record);
+        assert!(
+            file.written()
+                .unwrap()
+                .contains(at("w.csv").to_str().unwrap())
+        );
+        std::fs::write(at("v.csv"), "t,v\n0,1\n1,2\n2,3\n").unwrap();
+        std::fs::write(at("s.toml"), format!("{text}v = 'v.csv'\n")).unwrap();
+        let message = StudyFile::read(&at("s.toml")).unwrap_err().to_string();
+        assert!(
+            message.contains("inputs of one record have one step"),
+            "{message}"
+        );
+    }
+
     #[test]
     fn messages_are_one_line_with_the_place() {
         for (text, expected) in [
@@ -319,6 +351,14 @@ mod tests {
             (
                 "twin = 'x'\n[record]\nhold = 'cubic'\n",
                 "s.toml, line 3: unknown value `cubic`, expected one of `zero`, `linear`, `nearest`",
+            ),
+            (
+                "twin = 'x'\n[record.input]\nu1 = 1\nu2 = { levels = [2, 1], hold = 3 }\n",
+                "s.toml, line 4: invalid levels [2, 1]; write levels = [low, high]",
+            ),
+            (
+                "twin = 'x'\n[record.input]\nu1 = 2024-03-31\n",
+                "s.toml, line 3: [record] u1 is no date",
             ),
             ("twin = 'x'\n[record]\nsubsteps = 1e9\n", "s.toml, line 3"),
             ("twin = 'x'\n[record]\nsubsteps = -1\n", "s.toml, line 3"),

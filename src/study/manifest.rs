@@ -1,12 +1,13 @@
 //! Settings of a study that its results depend on.
 
-use super::{InputPlan, Study, StudyError};
+use super::{PlannedInputs, Study, StudyError};
 use crate::record::Signal;
 use crate::storage::StorageError;
 use crate::storage::checksum::sha256;
 use crate::storage::work::{Manifest, checksum};
 use crate::twin::Noise;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 impl Study {
     /// A manifest of a folder that `verb` makes, with the twin, its parameters, the study file, records and inputs (an input
@@ -22,7 +23,18 @@ impl Study {
             .with("study", self.written()?)
             .with("record", json!(self.plan().map(|p| (p.step, p.samples))));
         let manifest = match self.plan().and_then(|plan| plan.input.as_ref()) {
-            Some(InputPlan::File(path)) => manifest.with("input file", checksum(path)?),
+            Some(PlannedInputs::File(path)) => manifest.with("input file", checksum(path)?),
+            Some(input @ PlannedInputs::Each(_)) if !input.files().is_empty() => {
+                let sums: Result<BTreeMap<_, _>, StorageError> = (input.files().into_iter())
+                    .filter_map(|(name, path)| Some((name?, checksum(path))))
+                    .map(|(name, sum)| Ok((name, sum?)))
+                    .collect();
+                // A path that is no text is told by its checksum alone.
+                let input = serde_json::to_value(input).unwrap_or_default();
+                manifest
+                    .with("input", input)
+                    .with("input files", json!(sums?))
+            }
             input => manifest.with("input", json!(input)),
         };
         // Last: what else is different tells more.
@@ -60,7 +72,7 @@ impl Study {
 
 #[cfg(test)]
 mod tests {
-    use crate::study::{RecordPlan, Study};
+    use crate::study::{InputPlan, RecordPlan, Study};
     use crate::twins::CascadedTanks;
 
     fn tanks(high: f64) -> Study {
@@ -74,5 +86,18 @@ mod tests {
         assert_eq!(manifest(3.0).differs(&manifest(3.0)), None);
         let difference = manifest(3.0).differs(&manifest(2.0)).unwrap();
         assert!(difference.starts_with("input was"), "{difference}");
+    }
+    #[test]
+    fn another_file_of_an_input_is_another_study() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("u.csv");
+        let manifest = |level: f64| {
+            std::fs::write(&path, format!("t,u\n0,{level}\n1,1\n")).unwrap();
+            let plan = RecordPlan::by_input(1.0, 2, [("u", InputPlan::File(path.clone()))]);
+            let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+            study.manifest("bank", 1).unwrap()
+        };
+        let difference = manifest(1.0).differs(&manifest(2.0)).unwrap();
+        assert!(difference.starts_with("input files"), "{difference}");
     }
 }

@@ -3,6 +3,7 @@
 mod error;
 mod file;
 mod fit;
+mod input_plan;
 mod manifest;
 mod noise_table;
 mod plan;
@@ -11,12 +12,11 @@ mod tables;
 
 pub use error::StudyError;
 pub use file::StudyFile;
+pub use input_plan::InputPlan;
+pub(crate) use input_plan::PlannedInputs;
 pub(crate) use noise_table::NoiseTable;
 pub use noise_table::ProcessNoise;
 pub(crate) use plan::DriveSource;
-pub(crate) use plan::InputPlan;
-#[cfg(feature = "fmi")]
-pub(crate) use plan::Levels;
 pub use plan::RecordPlan;
 pub(crate) use tables::{Library, RecordTable};
 

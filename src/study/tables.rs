@@ -2,7 +2,7 @@
 
 use crate::effect::EffectPattern;
 use crate::record::Columns;
-use crate::study::plan::InputPlan;
+use crate::study::input_plan::PlannedInputs;
 use crate::twin::{Hold, Integrator, Interval};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -18,7 +18,7 @@ pub struct RecordTable {
     /// Number of samples.
     pub samples: Option<usize>,
     /// Inputs.
-    pub input: Option<InputPlan>,
+    pub input: Option<PlannedInputs>,
     /// Inputs between samples, also of measured records.
     pub hold: Option<Hold>,
     /// Integrator of the twin, also for measured records.
@@ -165,10 +165,11 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
             DeValue::Table(inner) if inner.is_empty() && name != "features" => {
                 "is empty; remove it"
             }
-            DeValue::Table(inner) if keeps_intervals || name == "fixed" => {
+            DeValue::Table(inner) if keeps_intervals || matches!(name, "fixed" | "record") => {
                 check_table(name, inner)?;
                 continue;
             }
+            DeValue::Datetime(_) if name == "record" => "is no date; correct it, or remove it",
             value if name == "prior" && key == TRUST && !value.is_bool() => "is true or false",
             DeValue::Array(ends) if keeps_intervals && ends.len() != 2 => {
                 "has two ends: write [low, high]"

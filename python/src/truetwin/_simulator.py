@@ -22,6 +22,8 @@ Outputs = Union[npt.ArrayLike, Mapping[str, npt.ArrayLike]]
 #: ``f(parameters, inputs, time)``; with arguments named ``step`` or ``seed``, it gets these too.
 Simulator = Callable[..., Outputs]
 Range = tuple[float, float]
+#: Inputs of simulated records: one range for all, or by input a range, ``{"levels": (low, high), "hold": n}``, a number, or a CSV file.
+Levels = Union[Range, Mapping[str, Union[Range, float, str, "os.PathLike[str]", Mapping[str, Any]]]]
 
 #: Inputs that are kept parsed; a record's inputs come with each request.
 KEPT_INPUTS = 64
@@ -57,7 +59,7 @@ class Model:
         outputs: str | Sequence[str] | Mapping[str, str],
         step: float,
         samples: int,
-        levels: Range | None,
+        levels: Levels | None,
         hold: int,
         name: str | None,
     ) -> None:
@@ -74,7 +76,9 @@ class Model:
         self._times: dict[tuple[float, int, float], Array] = {}
         record: dict[str, Any] = {"step": self.step, "samples": whole("samples", samples)}
         if levels is not None:
-            record["input"] = {"levels": [float(level) for level in levels], "hold": whole("hold", hold)}
+            record["input"] = planned(levels, hold)
+            if files := [name for name, plan in record["input"].items() if isinstance(plan, str)]:
+                raise ValueError(f"levels: {files[0]} is a file; name files in a study file, [record] input: study=FILE")
         self.description = {
             "name": self.name,
             "parameters": [_described(key, value) for key, value in self.parameters.items()],
@@ -218,6 +222,37 @@ def _units(names: str | Sequence[str] | Mapping[str, str]) -> dict[str, str]:
     if len(units) != len(names):
         raise ValueError(f"inputs or outputs {_list(names)}: a name appears twice; rename one")
     return units
+
+
+def planned(levels: Levels, hold: int) -> dict[str, Any]:
+    """Return the plan of inputs as ``[record] input`` has it."""
+    if not isinstance(levels, Mapping):
+        return _staircase("levels", levels, hold)
+    plans: dict[str, Any] = {}
+    for name, plan in levels.items():
+        if isinstance(plan, (str, os.PathLike)):
+            plans[name] = os.path.abspath(os.fspath(plan))
+        elif isinstance(plan, Mapping):
+            if unknown := set(plan) - {"levels", "hold"}:
+                raise ValueError(f"levels: {name} has no {sorted(unknown)[0]}; give levels and hold")
+            plans[name] = _staircase(f"levels: {name}", plan.get("levels"), plan.get("hold", hold))
+        elif np.ndim(plan) == 0 and not isinstance(plan, bool):
+            try:
+                plans[name] = float(plan)  # type: ignore[arg-type]
+            except (TypeError, ValueError):
+                raise ValueError(f"levels: {name} = {plan!r}; give (low, high), a number, or the path of a file") from None
+        else:
+            plans[name] = _staircase(f"levels: {name}", plan, hold)
+    return plans
+
+
+def _staircase(what: str, levels: Any, hold: int) -> dict[str, Any]:
+    samples = whole("hold", hold)
+    try:
+        low, high = levels
+        return {"levels": [float(low), float(high)], "hold": samples}
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} = {levels!r}; give (low, high)") from None
 
 
 def _parameter(name: str, value: Parameter | Range) -> Parameter:

@@ -17,7 +17,7 @@ from ._records import Record, Records
 from ._report import Report
 from ._results import Check, Diagnosis, Estimate, Estimator, Fit, Json, Scorecard
 from ._server import Server
-from ._simulator import Array, Model, Parameter, Range, Simulator, _units, check_noise, whole
+from ._simulator import Array, Levels, Model, Parameter, Range, Simulator, _units, check_noise, planned, whole
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped, unused-ignore]
@@ -57,8 +57,9 @@ class Twin:
         `diagnose` estimate it from the record.
     samples : int, optional
         Number of samples of simulated records.
-    levels : (low, high), optional
-        Range of the random inputs of simulated records.
+    levels : (low, high), or dict of str to (low, high), dict, float or path, optional
+        Inputs of simulated records. A range: each input a staircase of random levels. By input: such a range, or
+        ``{"levels": (low, high), "hold": n}``; a constant; or, for equations, the path of a CSV file that has the column.
     hold : int, optional
         Number of samples for which a random input is held.
     name : str, optional
@@ -96,7 +97,7 @@ class Twin:
         step: float | None = None,
         noise: float | Mapping[str, float] | None = None,
         samples: int = 300,
-        levels: Range | None = None,
+        levels: Levels | None = None,
         hold: int = 20,
         name: str | None = None,
         study: Path_ | None = None,
@@ -120,7 +121,7 @@ class Twin:
                 raise ValueError("equations need parameters={name: (low, high)} and outputs={name: expression}")
             plan: dict[str, Any] = {} if step is None else {"step": float(step), "samples": whole("samples", samples)}
             if levels is not None:
-                plan["input"] = {"levels": [float(level) for level in levels], "hold": whole("hold", hold)}
+                plan["input"] = planned(levels, hold)
             self._text = Text(
                 name or "twin", parameters, _noisy(states, noise, outputs, True), inputs if isinstance(inputs, Mapping) else _units(inputs),
                 _noisy(outputs, noise, outputs, False), constants or {}, define or {}, {**plan, **(record or {})},

@@ -2,7 +2,7 @@
 
 use crate::record::Quantity;
 use crate::storage::untrusted::message;
-use crate::study::{InputPlan, Levels, RecordPlan};
+use crate::study::{InputPlan, RecordPlan};
 use crate::twin::{Interval, Parameter};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
@@ -217,7 +217,7 @@ impl ModelDescription {
         Ok(())
     }
 
-    /// Step, length and, where all inputs have the same two limits, random levels between these.
+    /// Step, length and, where all inputs have two limits, random levels between these.
     pub fn plan(&self) -> RecordPlan {
         let span = (self.stop.map(|stop| stop - self.start)).filter(|span| *span > 0.0);
         let step = (self.step.filter(|step| *step > 0.0))
@@ -225,16 +225,15 @@ impl ModelDescription {
             .unwrap_or(0.01);
         let intervals = span.map_or(SAMPLES, |span| (span / step).round());
         let samples = (intervals as usize).saturating_add(1);
-        let mut limits = self.inputs.iter().map(|v| Some((v.min?, v.max?)));
-        let first = limits.next().flatten();
-        let same = first.filter(|_| limits.all(|other| other == first));
-        let levels = same.and_then(|(low, high)| Interval::new(low, high).ok());
-        RecordPlan {
-            input: levels.map(|levels| {
-                let hold = (samples / HOLDS).max(1);
-                InputPlan::Levels(Levels { levels, hold })
-            }),
-            ..RecordPlan::autonomous(step, samples)
+        let hold = (samples / HOLDS).max(1);
+        let levels = |v: &FmuVariable| {
+            let levels = Interval::new(v.min?, v.max?).ok()?;
+            Some((v.name.clone(), InputPlan::Levels { levels, hold }))
+        };
+        let plans: Option<Vec<_>> = self.inputs.iter().map(levels).collect();
+        match plans.filter(|plans| !plans.is_empty()) {
+            Some(plans) => RecordPlan::by_input(step, samples, plans),
+            None => RecordPlan::autonomous(step, samples),
         }
     }
 }
@@ -303,7 +302,8 @@ mod tests {
         );
         assert_eq!(found.inputs[0].quantity(), Quantity::new("u", "m"));
         assert_eq!(found.outputs[0].quantity(), Quantity::new("x", "mm"));
-        assert_eq!(found.plan(), RecordPlan::levels(0.1, 31, -2.0, 2.0, 2));
+        let plans = [("u", InputPlan::levels(-2.0, 2.0, 2))];
+        assert_eq!(found.plan(), RecordPlan::by_input(0.1, 31, plans));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::super::name;
 use crate::record::{Quantity, Signals};
 use crate::setting::number;
 use crate::storage::untrusted::message;
-use crate::study::{InputPlan, RecordPlan, RecordTable};
+use crate::study::{RecordPlan, RecordTable};
 use crate::twin::{Interval, Parameter, ParameterSpace};
 use serde::Deserialize;
 
@@ -132,7 +132,8 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
             number(step)
         ));
     }
-    if let Some(InputPlan::File(path)) = &table.input {
+    let files = (table.input.iter()).flat_map(|input| input.files());
+    if let Some((_, path)) = files.into_iter().next() {
         return Err(format!(
             "record: input is the file {}; say {{\"levels\": [low, high], \"hold\": n}}, and name files in a study file",
             path.display()
@@ -153,6 +154,7 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::InputPlan;
 
     const GOOD: &str = r#"{"name": "lag", "parameters": [{"name": "tau", "unit": "s", "prior": [1, 3], "bounds": [0.1, 9]},
         {"name": "k", "prior": [0.5, 2]}], "inputs": [{"name": "u", "unit": "V"}], "outputs": [{"name": "y"}],
@@ -167,6 +169,21 @@ mod tests {
         assert_eq!(found.parameters[1].bounds, found.parameters[1].prior);
         assert_eq!(found.signals.inputs, [Quantity::new("u", "V")]);
         assert_eq!(found.record, RecordPlan::levels(0.1, 60, -1.0, 1.0, 5));
+    }
+
+    #[test]
+    fn each_input_may_have_its_plan() {
+        let each = "{\"u\": {\"levels\": [-1, 1], \"hold\": 5}, \"v\": 60}";
+        let text = (GOOD.replace("\"unit\": \"V\"}]", "\"unit\": \"V\"}, {\"name\": \"v\"}]"))
+            .replace("{\"levels\": [-1, 1], \"hold\": 5}", each);
+        let plans = [
+            ("u", InputPlan::levels(-1.0, 1.0, 5)),
+            ("v", InputPlan::Constant(60.0)),
+        ];
+        let expected = RecordPlan::by_input(0.1, 60, plans);
+        assert_eq!(Description::parse(&text).unwrap().record, expected);
+        let message = Description::parse(&text.replace(", \"v\": 60", "")).unwrap_err();
+        assert!(message.contains("v has no plan"), "{message}");
     }
 
     #[test]
@@ -195,6 +212,16 @@ mod tests {
                 "{\"levels\": [-1, 1], \"hold\": 5}",
                 "\"/etc/x.csv\"",
                 "study file",
+            ),
+            (
+                "{\"levels\": [-1, 1], \"hold\": 5}",
+                "{\"u\": \"/etc/x.csv\"}",
+                "study file",
+            ),
+            (
+                "{\"levels\": [-1, 1], \"hold\": 5}",
+                "{\"v\": 1}",
+                "the twin has no input \"v\" (did you mean \"u\"?)",
             ),
             ("\"outputs\"", "\"outptus\"", "unknown key `outptus`"),
         ] {

@@ -3,7 +3,7 @@
 use super::{or_pass, present, text, with_unit};
 use crate::math::{deviation, ends, largest, median};
 use crate::record::{Drive, Record, RecordError, Signal};
-use crate::study::{InputPlan, Study};
+use crate::study::Study;
 use crate::twin::conformance::Finding;
 
 /// Share of the planned range that an input may leave it by: the accuracy of an actuator.
@@ -32,10 +32,9 @@ pub(super) fn check_inputs(
         return (findings, factors);
     };
     for (j, input) in inputs.iter().enumerate() {
-        let (low, high) = match study.plan().and_then(|plan| plan.input.as_ref()) {
-            Some(InputPlan::Levels(levels)) => (levels.levels.low(), levels.levels.high()),
-            _ => ends(&present(planned.inputs(), j).1),
-        };
+        let plan = study.plan().and_then(|plan| plan.input.as_ref());
+        let (low, high) = (plan.and_then(|plan| plan.range(&input.name)))
+            .unwrap_or_else(|| ends(&present(planned.inputs(), j).1));
         let (_, values) = present(record.drive().inputs(), j);
         let (least, most) = ends(&values);
         let given = format!(
@@ -55,7 +54,9 @@ pub(super) fn check_inputs(
             factors[j] = factor;
             continue;
         }
-        let margin = MARGIN * (high - low);
+        // Of an input that is to stay, the accuracy is a share of its value.
+        let extent = if high > low { high - low } else { high.abs() };
+        let margin = MARGIN * extent;
         let range = low - margin..=high + margin;
         let outside = values.iter().filter(|v| !range.contains(v)).count();
         if outside > 0 {

@@ -560,6 +560,72 @@ fn a_study_with_an_input_file_has_its_step() {
     );
 }
 
+/// Levels, a constant and a file, each for its input, in all verbs that simulate records; the estimator keeps the plan.
+#[test]
+fn each_input_of_a_study_may_have_its_plan() {
+    let rows: String = (0..60).map(|k| format!("{k},{}\n", k / 10 % 3)).collect();
+    file("wind.csv", &format!("t,wind\n{rows}"));
+    let twin = "[twin]\nname = 'three'\n[parameters]\nk = { prior = [0.2, 0.6], bounds = [0.1, 1.0] }\n\
+        [states]\nx = { rate = 'hold + 0.1*sun + wind - k*x', start = 0.0, noise = 0.01 }\n\
+        [inputs]\nhold = {}\nsun = {}\nwind = {}\n[outputs]\ny = { value = 'x', noise = 0.05 }\n";
+    let input = "hold = { levels = [0, 2], hold = 6 }\nsun = 20\nwind = 'wind.csv'\n";
+    let good = file("each.toml", &format!("{twin}[record.input]\n{input}"));
+    let (record, estimator) = (at("each.csv"), at("each.est"));
+    done(&["check", "--study", &good]);
+    done(&[
+        "simulate", "--study", &good, "--theta", "k=0.4", "--out", &record,
+    ]);
+    let text = std::fs::read_to_string(&record).unwrap();
+    let cells: Vec<Vec<f64>> = (text.lines().skip(1))
+        .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+        .collect();
+    assert!(cells.len() == 60 && text.starts_with("t,u1,u2,u3,y\n"));
+    for (k, row) in cells.iter().enumerate() {
+        assert!((0.0..2.0).contains(&row[1]) && row[1] == cells[k / 6 * 6][1]);
+        assert_eq!((row[2], row[3]), (20.0, (k / 10 % 3) as f64));
+    }
+    let sizes = ["--bank-size", "200", "--epochs", "2"];
+    done(
+        &[
+            &["pretrain", "--study", &good, "--out", &estimator],
+            &sizes[..],
+        ]
+        .concat(),
+    );
+    done(&["estimate", &record, "--estimator", &estimator]);
+    done(&[
+        "bank",
+        "--study",
+        &good,
+        "--size",
+        "20",
+        "--out",
+        &at("each.bank"),
+    ]);
+    for (input, parts) in [
+        (
+            "hold = 1\nsun = 2\n",
+            ["wind has no plan", "each of hold, sun, wind"],
+        ),
+        (
+            "hold = 1\nsun = 2\nwinds = 3\n",
+            ["no input \"winds\"", "did you mean \"wind\""],
+        ),
+        (
+            "hold = 1\nsun = 2\nwind = 'no.csv'\n",
+            ["no.csv", "No such file"],
+        ),
+        (
+            "hold = 1\nsun = [0, 1]\nwind = 3\n",
+            ["wrong.toml, line 1", "sun is a list; write { levels"],
+        ),
+    ] {
+        let text = format!("{twin}[record]\nstep = 1\nsamples = 60\n[record.input]\n{input}");
+        let wrong = file("wrong.toml", &text);
+        refused(&["check", "--study", &wrong], &parts);
+    }
+}
+
 /// The twin's own noise level is taken at the study's step.
 #[test]
 fn an_estimated_noise_level_may_be_the_twins_own() {
