@@ -308,7 +308,7 @@ fn input_column(header: &[&str], names: &[&str], own: &str) -> Result<usize, Str
         _ => Err(format!(
             "no column is called \"{}\"{}; the columns are {}: rename one to {}",
             quoted(own),
-            did_you_mean(own, header),
+            did_you_mean(own, inputs.iter().map(|at| header[*at])),
             excerpt(&header.join(", ")),
             quoted(own)
         )),

@@ -251,6 +251,34 @@ mod tests {
         }
     }
 
+    /// Empty lines count, in whatever a message is about.
+    #[test]
+    fn rows_are_counted_as_an_editor_counts_lines() {
+        for (text, part) in [
+            ("t,u,y\n\n0,1,2\n\n\n1,1,a\n", "row 6, column y"),
+            (
+                "t,u,y\n0,1,2\n\n1,1,2\n\n0.5,1,2\n",
+                "row 6, column t: 0.5 s follows",
+            ),
+            (
+                "\nt,u,y\n0,1,2\n\n0,3,2\n1,1,2\n",
+                "row 5, column u: input 1",
+            ),
+            ("t,u,y\r\n\r\n0,1,2\r\n1,1\r\n", "row 4 has 2 cells"),
+            ("t;u;y\n0,5;1;2\n\n1.5;1;2\n", "row 4, column t"),
+        ] {
+            let message = message(text);
+            assert!(message.contains(part), "{message}");
+        }
+        let incomplete = |text| written(text).unwrap().check_complete().unwrap_err();
+        let missing = incomplete("t,u,y\n\n0,1,2\n1,1,2\n\n2,1,\n").to_string();
+        assert!(missing.starts_with("row 6, column y"), "{missing}");
+        let uneven = incomplete("t,y\n0,1\n1,1\n\n2,1\n\n5,1\n").to_string();
+        assert!(uneven.starts_with("row 7, column t"), "{uneven}");
+        let (plain, spaced) = ("t,y\n0,1\n1,2\n", "t,y\n\n0,1\n1,2\n");
+        assert_eq!(written(plain).unwrap(), written(spaced).unwrap());
+    }
+
     #[test]
     fn headers_are_checked() {
         assert!(message("t,u,y,temperature\n0,1,2,3\n").contains("\"temperature\""));

@@ -1,5 +1,6 @@
 //! The time grid and the inputs of one experiment.
 
+use super::lines::FileLines;
 use crate::record::RecordError;
 use ndarray::{Array2, s};
 use std::sync::Arc;
@@ -26,6 +27,8 @@ pub struct Drive {
     inputs: Signal,
     /// Times on the record's own clock, one a row, where steps vary.
     times: Option<Arc<[f64]>>,
+    /// Lines of the file that the rows were read from, for messages.
+    lines: FileLines,
 }
 
 impl Drive {
@@ -48,6 +51,7 @@ impl Drive {
             first_time: 0.0,
             inputs,
             times: None,
+            lines: FileLines::default(),
         })
     }
 
@@ -132,6 +136,16 @@ impl Drive {
         self
     }
 
+    /// The same drive, its rows in these lines of a file.
+    pub(crate) fn in_lines(self, lines: FileLines) -> Self {
+        Self { lines, ..self }
+    }
+
+    /// Lines of the file that the rows were read from.
+    pub(crate) fn lines(&self) -> &FileLines {
+        &self.lines
+    }
+
     /// Checks that all steps are the same, as a twin needs it that is told one step.
     pub(crate) fn check_uniform(&self) -> Result<(), RecordError> {
         match self.is_uniform() {
@@ -148,6 +162,7 @@ impl Drive {
             first_time: self.first_time,
             inputs: self.inputs.slice(s![..rows, ..]).to_owned(),
             times: self.times.as_ref().map(|times| times[..rows].into()),
+            lines: self.lines.clone(),
         }
     }
 
@@ -159,6 +174,7 @@ impl Drive {
         Ok(Self {
             times: self.times.clone(),
             first_time: self.first_time,
+            lines: self.lines.clone(),
             ..Self::new(self.dt, inputs)?
         })
     }

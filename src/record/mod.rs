@@ -10,6 +10,7 @@ mod channels;
 mod csv;
 mod drive;
 mod error;
+mod lines;
 mod measured;
 mod parquet;
 mod resample;

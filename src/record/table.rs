@@ -1,6 +1,7 @@
 //! The numbers of a record file, checked cell by cell.
 
 use super::channels::{Wanted, column_names, columns, is_usual};
+use super::lines::FileLines;
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};
 use crate::record::{Drive, Record, RecordError, Signal};
@@ -22,6 +23,7 @@ pub(super) struct Table {
     times: Vec<f64>,
     inputs: Signal,
     outputs: Signal,
+    lines: FileLines,
 }
 
 impl Table {
@@ -34,8 +36,10 @@ impl Table {
             return Err(RecordError::file(path, problem));
         }
         let inputs = self.inputs.ncols();
-        let drive = Drive::with_times(&self.times, self.inputs);
-        drive.map_err(|error| in_file(error, path, &self.time, inputs))
+        match Drive::with_times(&self.times, self.inputs) {
+            Ok(drive) => Ok(drive.in_lines(self.lines)),
+            Err(error) => Err(in_file(error, path, &self.time, inputs, &self.lines)),
+        }
     }
 
     /// The table as a record, which needs outputs.
@@ -46,8 +50,8 @@ impl Table {
         }
         let inputs = self.inputs.ncols();
         (Drive::with_times(&self.times, self.inputs))
-            .and_then(|drive| Record::new(drive, self.outputs))
-            .map_err(|error| in_file(error, path, &self.time, inputs))
+            .and_then(|drive| Record::new(drive.in_lines(self.lines.clone()), self.outputs))
+            .map_err(|error| in_file(error, path, &self.time, inputs, &self.lines))
     }
 
     /// Parses a table; `read` counts the numbers of this file and those before.
@@ -59,8 +63,10 @@ impl Table {
     ) -> Result<Self, RecordError> {
         let separator = text.separator;
         let mut reader = Rows::separated(text.text, separator);
-        let csv_error = |error| csv_error(path, separator, error);
-        let header = reader.header().map_err(csv_error)?;
+        let header = (reader.header()).map_err(|error| {
+            let line = reader.line();
+            csv_error(path, separator, line, error)
+        })?;
         let large = |problem: String| {
             let remedy = "cut the record into shorter ones, or resample it";
             RecordError::file(path, format!("{problem}; {remedy}"))
@@ -97,7 +103,10 @@ impl Table {
         let mut row = vec![f64::NAN; width];
         let mut cells = csv::StringRecord::new();
         let mut parser = CellParser::new(separator, inputs);
-        while reader.read(&mut cells).map_err(csv_error)? {
+        let mut surplus: Vec<(usize, usize)> = vec![];
+        while (reader.read(&mut cells))
+            .map_err(|error| csv_error(path, separator, reader.line(), error))?
+        {
             if t.len() == MOST_SAMPLES {
                 return Err(large(format!("more than {MOST_SAMPLES} samples")));
             }
@@ -107,7 +116,11 @@ impl Table {
                     "more than {MOST_NUMBERS} numbers in all records together"
                 )));
             }
-            let number = cells.position().map_or(t.len() + 2, |p| p.line() as usize);
+            let number = reader.line();
+            let lines = number.saturating_sub(t.len() + 2);
+            if surplus.last().map_or(0, |(_, lines)| *lines) != lines {
+                surplus.push((t.len(), lines));
+            }
             for ((cell, place), name) in cells.iter().zip(&places).zip(&header) {
                 if let Some(place) = *place {
                     row[place] = (parser.parse(cell, place, number))
@@ -132,21 +145,28 @@ impl Table {
             times: t,
             inputs: signal(inputs, u)?,
             outputs: signal(outputs, y)?,
+            lines: FileLines::of(surplus),
         })
     }
 }
 
 /// Adds file, row and column to an error of the numbers of a table.
-fn in_file(error: RecordError, path: &Path, time: &str, inputs: usize) -> RecordError {
+fn in_file(
+    error: RecordError,
+    path: &Path,
+    time: &str,
+    inputs: usize,
+    lines: &FileLines,
+) -> RecordError {
     match error {
         RecordError::TimeOrder { sample, .. } => {
-            RecordError::cell(path, sample + 2, time, error.to_string())
+            RecordError::cell(path, lines.line(sample), time, error.to_string())
         }
         RecordError::ReplicateInputs {
             sample, channel, ..
         } => {
             let column = column_names("u", inputs).swap_remove(channel - 1);
-            RecordError::cell(path, sample + 2, &column, error.to_string())
+            RecordError::cell(path, lines.line(sample), &column, error.to_string())
         }
         RecordError::Step(step) => RecordError::file(
             path,
@@ -251,14 +271,11 @@ fn not_a_stamp(cell: &str) -> String {
 }
 
 /// The parser's error, by row.
-fn csv_error(path: &Path, separator: u8, error: csv::Error) -> RecordError {
-    let row = |position: Option<csv::Position>| position.map_or(0, |p| p.line());
+fn csv_error(path: &Path, separator: u8, row: usize, error: csv::Error) -> RecordError {
     let problem = match error.into_kind() {
         csv::ErrorKind::Io(error) => return RecordError::io(path, error),
         csv::ErrorKind::UnequalLengths {
-            pos,
-            expected_len,
-            len,
+            expected_len, len, ..
         } => {
             let comma = if len > expected_len && separator == b',' {
                 "; write decimal points, or separate the columns by semicolons"
@@ -266,12 +283,11 @@ fn csv_error(path: &Path, separator: u8, error: csv::Error) -> RecordError {
                 ""
             };
             format!(
-                "row {} has {len} cells, the header has {expected_len}, separated by {}{comma}",
-                row(pos),
+                "row {row} has {len} cells, the header has {expected_len}, separated by {}{comma}",
                 separator_name(separator)
             )
         }
-        csv::ErrorKind::Utf8 { pos, err } => format!("row {}: {err}", row(pos)),
+        csv::ErrorKind::Utf8 { err, .. } => format!("row {row}: {err}"),
         other => format!("{other:?}"),
     };
     let remedy = "a record is UTF-8 text, each row with as many cells as the header";

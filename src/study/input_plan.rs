@@ -141,7 +141,7 @@ impl PlannedInputs {
                 _ => "",
             };
             return Err(format!(
-                "input: the twin has no input \"{}\"{}; name its inputs, {}{alike}",
+                "input: the twin has no input \"{}\"{}; name its inputs {}{alike}",
                 quoted(name),
                 did_you_mean(name, names()),
                 all()
@@ -398,7 +398,7 @@ mod tests {
             ),
             (
                 "{ pump = 1, vavle = 2 }",
-                "no input \"vavle\" (did you mean \"valve\"?); name its inputs, pump, valve",
+                "no input \"vavle\" (did you mean \"valve\"?); name its inputs pump, valve",
             ),
             ("{ pump = 1, valve = nan }", "input valve: NaN; give"),
             (

@@ -425,8 +425,8 @@ mod tests {
         assert_eq!(column(&["a", "b"], "a", "t,y1,y2,pump"), Ok(3.0));
         for (header, part) in [
             (
-                "t,c,d,y",
-                "no column is called \"b\"; the columns are t, c, d, y: rename one to b",
+                "t,calm,deep,y",
+                "no column is called \"b\"; the columns are t, calm, deep, y: rename one to b",
             ),
             ("t,b,b,y", "column \"b\" appears twice"),
             ("b,c,d,y", "column t is missing"),

@@ -169,7 +169,9 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
                 check_table(name, inner)?;
                 continue;
             }
-            DeValue::Datetime(_) if name == "record" => "is no date; correct it, or remove it",
+            DeValue::Datetime(_) if name == "record" => {
+                "is no date; write a number, or a text in quotes"
+            }
             value if name == "prior" && key == TRUST && !value.is_bool() => "is true or false",
             DeValue::Array(ends) if keeps_intervals && ends.len() != 2 => {
                 "has two ends: write [low, high]"

@@ -12,6 +12,14 @@ pub(crate) struct Rows<R> {
     reader: csv::Reader<Bounded<R>>,
     /// Where the row begins that is being read, in bytes.
     row: Rc<Cell<u64>>,
+    /// Bytes before the text whose lines are not counted yet.
+    counted: u64,
+    /// Line, from 1, that this text begins in.
+    next: usize,
+    /// `true` if a carriage return is before it, to which a line feed belongs.
+    after_return: bool,
+    /// Line, from 1, that the last row begins in.
+    line: usize,
 }
 
 /// Gives no more bytes than the row that is being read may have.
@@ -19,6 +27,9 @@ struct Bounded<R> {
     from: R,
     given: u64,
     row: Rc<Cell<u64>>,
+    /// Bytes given and not counted yet, behind those that are done.
+    text: Vec<u8>,
+    done: usize,
 }
 
 impl<R: Read> Read for Bounded<R> {
@@ -29,6 +40,9 @@ impl<R: Read> Read for Bounded<R> {
         }
         let read = self.from.read(to)?;
         self.given += read as u64;
+        self.text.drain(..self.done);
+        self.done = 0;
+        self.text.extend_from_slice(&to[..read]);
         Ok(read)
     }
 }
@@ -46,23 +60,66 @@ impl<R: Read> Rows<R> {
             from,
             given: 0,
             row: row.clone(),
+            text: vec![],
+            done: 0,
         };
         let reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .delimiter(separator)
             .from_reader(bounded);
-        Self { reader, row }
+        Self {
+            reader,
+            row,
+            counted: 0,
+            next: 1,
+            after_return: false,
+            line: 1,
+        }
     }
 
     /// The names of the columns.
     pub fn header(&mut self) -> Result<csv::StringRecord, csv::Error> {
-        self.reader.headers().cloned()
+        let header = self.reader.headers().cloned();
+        self.count();
+        header
     }
 
     /// Reads the next row into `cells`; whether there was one.
     pub fn read(&mut self, cells: &mut csv::StringRecord) -> Result<bool, csv::Error> {
+        self.reader.headers()?;
+        self.count();
         self.row.set(self.reader.position().byte());
-        self.reader.read_record(cells)
+        let read = self.reader.read_record(cells);
+        self.count();
+        read
+    }
+
+    /// Line that the last row begins in, as an editor counts lines: from 1, the empty ones among them.
+    pub fn line(&self) -> usize {
+        self.line
+    }
+
+    /// Counts lines up to where the parser is. Its own number is that of the first empty line before a row.
+    fn count(&mut self) {
+        let until = self.reader.position().byte();
+        let behind = self.reader.get_mut();
+        let end = behind
+            .text
+            .len()
+            .min(behind.done + (until - self.counted) as usize);
+        let mut begin = None;
+        for &byte in &behind.text[behind.done..end] {
+            let is_feed = byte == b'\n';
+            if byte == b'\r' || is_feed && !self.after_return {
+                self.next += 1;
+            } else if !is_feed && begin.is_none() {
+                begin = Some(self.next);
+            }
+            self.after_return = byte == b'\r';
+        }
+        self.line = begin.unwrap_or(self.line);
+        behind.done = end;
+        self.counted = until;
     }
 }
 
@@ -88,6 +145,28 @@ mod tests {
                 }
             };
             assert!(error.contains("more than 1 MiB"), "{error}");
+        }
+    }
+
+    /// The ends of lines of all systems, empty lines, cells of several lines, and no end at all.
+    #[test]
+    fn lines_are_those_of_an_editor() {
+        for (text, expected) in [
+            ("t\n1\n2\n", &[2, 3][..]),
+            ("\n\nt\n\n1\n\n\n2", &[5, 8]),
+            ("t\r\n1\r\n\r\n2\r\n", &[2, 4]),
+            ("t\r1\r\r2", &[2, 4]),
+            ("t\n\"1\n\n\"\n2\n\r\n3", &[2, 5, 7]),
+        ] {
+            // However the bytes come.
+            for size in [1, 2, 100] {
+                let mut rows = Rows::new(std::io::BufReader::with_capacity(size, text.as_bytes()));
+                let (mut cells, mut lines) = (csv::StringRecord::new(), vec![]);
+                while rows.read(&mut cells).unwrap() {
+                    lines.push(rows.line());
+                }
+                assert_eq!(lines, expected, "{text:?}");
+            }
         }
     }
 

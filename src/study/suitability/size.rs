@@ -37,13 +37,14 @@ pub(super) fn check_inputs(
             .unwrap_or_else(|| ends(&present(planned.inputs(), j).1));
         let (_, values) = present(record.drive().inputs(), j);
         let (least, most) = ends(&values);
+        let stretch = |low: f64, high: f64| match low < high {
+            true => format!("in {} to {}", text(low), with_unit(high, &input.unit)),
+            false => format!("at {}", with_unit(high, &input.unit)),
+        };
+        let (measured, planned) = (stretch(least, most), stretch(low, high));
         let given = format!(
-            "input {} lies in {} to {}, the study's in {} to {}",
-            input.name,
-            text(least),
-            with_unit(most, &input.unit),
-            text(low),
-            with_unit(high, &input.unit)
+            "input {} lies {measured}, the study's {planned}",
+            input.name
         );
         let reach = largest(&values) / low.abs().max(high.abs());
         let in_reach = |factor: &f64| (REACHED.0..=REACHED.1).contains(&(reach / factor));

@@ -102,6 +102,7 @@ pub(super) fn in_seconds(record: Record, unit: f64) -> Result<Record, RecordErro
     let times: Vec<f64> = (0..record.samples())
         .map(|k| drive.own_time(k) / unit)
         .collect();
-    let drive = Drive::with_times(&times, drive.inputs().clone())?;
+    let lines = drive.lines().clone();
+    let drive = Drive::with_times(&times, drive.inputs().clone())?.in_lines(lines);
     Record::new(drive, record.outputs().clone())
 }

@@ -1,6 +1,6 @@
 //! Records as data loggers write them: other names, separators, encodings, time stamps, steps.
 
-use super::{done, json, refused};
+use super::{done, json, refused, truetwin};
 use std::fs;
 use tempfile::TempDir;
 
@@ -294,4 +294,32 @@ fn a_record_is_checked_against_a_twin() {
     let one = place.write("one.csv", "t,u,y\n0,1,2\n");
     refused(&["check", &one, "--twin", "tanks"], &["1 rows of data"]);
     refused(&["check", &record], &["no twin given"]);
+}
+
+/// Lines that hold no sample count: a row of a message is the line of an editor.
+#[test]
+fn rows_are_counted_as_an_editor_counts_lines() {
+    let place = Place::new();
+    let mut rows = place.rows();
+    rows[100][2] = "1e9".into();
+    let rows = rows.iter().map(|row| row.join(","));
+    let spaced: String = (rows.enumerate())
+        .map(|(k, row)| {
+            if k % 10 == 0 {
+                format!("\r\n{row}\r\n")
+            } else {
+                format!("{row}\r\n")
+            }
+        })
+        .collect();
+    // An empty line before the header, the header, and eleven empty lines before the sample.
+    let line = 1 + 1 + 11 + 101;
+    let record = place.write("spaced.csv", format!("\r\nt,u,y\r\n{spaced}"));
+    let output = truetwin(&["check", &record, "--twin", "tanks"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let outlying = format!("output y has outlying values in rows {line}:");
+    assert!(text.contains(&outlying), "{text}");
+    let warning = String::from_utf8(truetwin(&["features", &record, "--twin", "tanks"]).stderr);
+    let expected = format!("spaced.csv, row {line}, column y: 1000000000.0 is an outlier");
+    assert!(warning.unwrap().contains(&expected), "{expected}");
 }
