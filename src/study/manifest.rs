@@ -29,10 +29,8 @@ impl Study {
                     .filter_map(|(name, path)| Some((name?, checksum(path))))
                     .map(|(name, sum)| Ok((name, sum?)))
                     .collect();
-                // A path that is no text is told by its checksum alone.
-                let input = serde_json::to_value(input).unwrap_or_default();
                 manifest
-                    .with("input", input)
+                    .with("input", json!(input))
                     .with("input files", json!(sums?))
             }
             input => manifest.with("input", json!(input)),
@@ -43,12 +41,12 @@ impl Study {
 
     /// The text of the study file.
     fn written(&self) -> Result<String, StorageError> {
-        match self.plan().and_then(|plan| plan.input.as_ref()) {
-            Some(InputPlan::File(path)) if path.to_str().is_none() => {
-                Err(StorageError::NoText(path.clone()))
-            }
+        let input = self.plan().and_then(|plan| plan.input.as_ref());
+        let files = input.map(PlannedInputs::files).unwrap_or_default();
+        match files.iter().find(|(_, path)| path.to_str().is_none()) {
+            Some((_, path)) => Err(StorageError::NoText((*path).clone())),
             // A file that was read can be written.
-            _ => Ok(self.file().written().unwrap_or_default()),
+            None => Ok(self.file().written().unwrap_or_default()),
         }
     }
 

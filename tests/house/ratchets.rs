@@ -276,10 +276,10 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     let files = sources.sources.values();
     let files = files.map(|source| source.file.display().to_string());
     vec![
-        Ratchet::new("public items", 161, items.collect()),
+        Ratchet::new("public items", 162, items.collect()),
         Ratchet::new("error types", 14, errors),
         Ratchet::new("lines of code", 57_500, lines),
-        Ratchet::new("files", 462, files.collect()),
+        Ratchet::new("files", 466, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
         Ratchet::new("named numeric constants", 472, constants(sources)),
