@@ -1,6 +1,7 @@
 //! Texts against the equations in Rust that they stand for, and texts that are wrong.
 
 use super::Equations;
+use crate::likelihood::kalman::{FilterSettings, Kalman};
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Composed, DigitalTwin, Noise, Now, StateSpace, Twin};
 use crate::twins::{CascadedTanks, TANKS, VAN_DER_POL, VanDerPol};
@@ -245,6 +246,31 @@ fn next_is_the_value_at_the_next_sample() {
         problem(&format!("{text}[record]\nintegrator = \"euler\"\n"))
             .contains("leave out the integrator")
     );
+}
+
+/// Over 1000 values of each parameter, as near as those of a difference and as far as those of a search, the log-likelihood is smooth: steps
+/// that are chosen anew leave no jump of a millionth of it.
+#[test]
+fn likelihoods_under_adaptive_steps_are_smooth() {
+    let twin = Equations::parse(include_str!("../../examples/pendulum.toml")).unwrap();
+    let drive = drive(&Twin::new(twin.clone()), 0.05);
+    let outputs = twin.simulate(&[1.1, 0.3], &drive, Noise::new(2, "texts", 0));
+    let record = Record::new(drive, outputs.unwrap()).unwrap();
+    let twin = Arc::new(twin).equations().unwrap();
+    let settings = FilterSettings::default();
+    let filter = Kalman::new(twin, &record, &settings).unwrap();
+    let at = |theta: [f64; 2]| filter.log_likelihood(&theta).unwrap();
+    let top = at([1.1, 0.3]);
+    for width in [1e-4, 0.2] {
+        let values: Vec<f64> = (0..1000)
+            .map(|k| at([1.1 + width * (f64::from(k) / 1000.0 - 0.5), 0.3]))
+            .collect();
+        // Fourth differences of what is smooth vanish at this distance.
+        for five in values.windows(5) {
+            let jump = five[0] - 4.0 * five[1] + 6.0 * five[2] - 4.0 * five[3] + five[4];
+            assert!(jump.abs() < 1e-6 * top.abs(), "{width}: {jump:e} of {top}");
+        }
+    }
 }
 
 /// A cup that cools from a known temperature, first measured after 3 s; a dose and a wind that moves on a line, each by its own rule.
