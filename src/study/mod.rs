@@ -24,8 +24,8 @@ use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern, aug
 use crate::record::{Drive, Record, RecordError};
 use crate::setting::{did_you_mean, number};
 use crate::twin::{
-    Adaptation, DigitalTwin, Hold, Integrator, MOST_SUBSTEPS, Noise, NoiseLevel, Role, Stepping,
-    TOLERANCES, Twin, TwinError, adapt, check_twin, fix,
+    Adaptation, Composed, DigitalTwin, Hold, Integrator, MOST_SUBSTEPS, Noise, NoiseLevel, Role,
+    Stepping, TOLERANCES, Twin, TwinError, adapt, check_twin, fix,
 };
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -474,12 +474,14 @@ impl Study {
 
     /// Draws the input of a record; a fixed one is the same for any noise.
     pub fn drive(&self, noise: Noise) -> Result<Drive, StudyError> {
-        self.needed_plan()?.drive(&self.twin.signals(), noise)
+        Ok(self.drives()?.draw(noise)?)
     }
 
     /// Prepares the source of drives.
     pub(crate) fn drives(&self) -> Result<DriveSource, StudyError> {
-        self.needed_plan()?.prepare(&self.twin.signals())
+        let source = self.needed_plan()?.prepare(&self.twin.signals())?;
+        let holds = self.twin.equations().map(Composed::holds);
+        Ok(source.with_doses(holds.iter().flatten().map(|hold| *hold == Hold::Impulse)))
     }
 
     /// Checks whether features can be taken of a record: it has the step and the channels of this study, and no output is missing.

@@ -145,6 +145,7 @@ impl RecordPlan {
         let mut source = DriveSource {
             plan: self.clone(),
             inputs: vec![],
+            doses: vec![],
             fixed: None,
         };
         match &self.input {
@@ -302,6 +303,8 @@ pub struct DriveSource {
     plan: RecordPlan,
     /// One an input, unless all are fixed.
     inputs: Vec<InputSource>,
+    /// Which inputs are amounts that are added at a row; none known for a twin without equations.
+    doses: Vec<bool>,
     fixed: Option<Drive>,
 }
 
@@ -314,6 +317,12 @@ enum InputSource {
 }
 
 impl DriveSource {
+    /// The same, where random levels of these inputs are doses: given at the first row of each, and nothing until the next.
+    pub(super) fn with_doses(mut self, doses: impl Iterator<Item = bool>) -> Self {
+        self.doses = doses.collect();
+        self
+    }
+
     /// The drive of one record; random levels come from the noise sources `input/1`, `input/2`, …, so that the draws of an input do not
     /// depend on the plans of others.
     pub fn draw(&self, noise: Noise) -> Result<Drive, RecordError> {
@@ -336,10 +345,13 @@ impl DriveSource {
                 }
                 InputSource::Levels { levels, hold } => {
                     let mut source = noise.source(&format!("input/{}", j + 1));
+                    let is_dose = self.doses.get(j).is_some_and(|is_dose| *is_dose);
                     let mut level = 0.0;
                     for (k, value) in channel.iter_mut().enumerate() {
                         if k % hold == 0 {
                             level = levels.low() + levels.width() * source.uniform();
+                        } else if is_dose {
+                            level = 0.0;
                         }
                         *value = level;
                     }
@@ -353,6 +365,21 @@ impl DriveSource {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::{Study, StudyFile};
+
+    /// A drug is swallowed once a day, and not all day long.
+    #[test]
+    fn doses_are_given_once() {
+        let text = include_str!("../../examples/pharmacokinetics.toml");
+        let file = StudyFile::parse(text, "pk.toml".as_ref()).unwrap();
+        let drive = Study::of_file(&file).unwrap().drive(Noise::new(1, "t", 0));
+        let doses = drive.unwrap().inputs().column(0).to_vec();
+        for (k, dose) in doses.iter().enumerate() {
+            let given = k % 24 == 0;
+            assert_eq!((50.0..=200.0).contains(dose), given, "row {k}: {dose}");
+            assert!(given || *dose == 0.0);
+        }
+    }
 
     #[test]
     fn levels_are_held_and_fresh_for_each_record() {

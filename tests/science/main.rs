@@ -20,6 +20,7 @@ mod misspecification;
 mod noise;
 mod numbers;
 mod records;
+mod steps;
 mod suitability;
 
 /// Counts that `trials` of this probability give with at least `level`; each tail outside has at most (1 − level)/2.
