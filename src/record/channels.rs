@@ -377,7 +377,9 @@ fn usual_name(name: &str, signals: Option<&Signals>) -> Option<String> {
 fn ambiguous(header: &[&str], names: &[Option<String>], signals: &Signals) -> Option<String> {
     let has = |channels: &[Quantity], name: &str| channels.iter().any(|c| c.name == name);
     for (at, (column, name)) in header.iter().zip(names).enumerate() {
-        if has(&signals.inputs, column) && has(&signals.outputs, column) && name.is_some() {
+        // Time is time, whatever channels are called.
+        let is_channel = name.as_deref().is_some_and(|name| name != "t");
+        if is_channel && has(&signals.inputs, column) && has(&signals.outputs, column) {
             return Some(format!(
                 "column \"{0}\" is the name of an input and of an output; name the columns {1}",
                 quoted(column),

@@ -13,6 +13,8 @@ impl Study {
     /// A manifest of a folder that `verb` makes, with the twin, its parameters, the study file, records and inputs (an input
     /// file by its checksum), and the checksum of one simulation, which tells a twin whose equations have changed since.
     pub fn manifest(&self, verb: &'static str, layout: u32) -> Result<Manifest, StorageError> {
+        // It reads the input files, whose checksums are of what was read last.
+        let simulation = self.simulation();
         let space = self.twin().parameters();
         let parameters: Vec<Value> = (space.iter())
             .map(|p| json!({ "name": p.name, "prior": p.prior, "bounds": p.bounds }))
@@ -36,7 +38,7 @@ impl Study {
             input => manifest.with("input", json!(input)),
         };
         // Last: what else is different tells more.
-        Ok(manifest.with("simulation", self.simulation()))
+        Ok(manifest.with("simulation", simulation))
     }
 
     /// The text of the study file.
