@@ -56,7 +56,7 @@ impl WorkFolder {
                 if let Some(checksums) = fill(&new)? {
                     manifest = manifest.with(CHECKSUMS, checksums);
                 }
-                new.write(MANIFEST, manifest.text())?;
+                new.write(MANIFEST, manifest.file_text())?;
                 Ok(new.finish()?)
             };
             // Another process may have been faster.
@@ -123,7 +123,7 @@ impl WorkFolder {
     pub(crate) fn finish(&self, manifest: &Manifest, checksums: Value) -> Result<(), StorageError> {
         self.write(
             MANIFEST,
-            &manifest.clone().with(CHECKSUMS, checksums).text(),
+            &manifest.clone().with(CHECKSUMS, checksums).file_text(),
         )
     }
 

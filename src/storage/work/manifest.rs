@@ -9,6 +9,8 @@ use std::path::Path;
 
 /// Entry that a folder has in addition: of pieces, once it is finished, or of what it was filled with.
 pub(super) const CHECKSUMS: &str = "checksums";
+/// Entry of the file alone: the checksum of all others but that one.
+const OWN: &str = "sha256";
 /// Longest value that a message shows, in characters.
 const SHORT: usize = 40;
 
@@ -55,19 +57,29 @@ impl Manifest {
         self.verb
     }
 
-    /// Returns the SHA-256 of the text, in hexadecimal digits.
+    /// Returns the SHA-256 of the entries, in hexadecimal digits.
     pub(crate) fn checksum(&self) -> String {
         sha256(self.text().as_bytes())
     }
 
-    /// Returns the text of the file.
-    pub(super) fn text(&self) -> String {
+    fn text(&self) -> String {
         format!("{:#}\n", Value::Object(self.entries.clone()))
+    }
+
+    /// Returns the text of the file, with the checksum of the entries.
+    pub(super) fn file_text(&self) -> String {
+        let unfinished = self.clone().unfinished();
+        let sum = unfinished.checksum();
+        let mut whole = unfinished.with(OWN, sum);
+        if let Some(checksums) = self.checksums() {
+            whole = whole.with(CHECKSUMS, checksums.clone());
+        }
+        whole.text()
     }
 
     /// Parses the folder's text.
     pub(super) fn parse(verb: &'static str, text: &str) -> Result<Self, String> {
-        let entries: Map<String, Value> = serde_json::from_str(text).map_err(|error| {
+        let mut entries: Map<String, Value> = serde_json::from_str(text).map_err(|error| {
             format!(
                 "its manifest.json is damaged: {}",
                 excerpt(&error.to_string())
@@ -78,7 +90,17 @@ impl Manifest {
             .and_then(|schema| schema.strip_prefix("truetwin.")?.split_once("-folder/"))
             .map(|(maker, _)| maker);
         match maker {
-            Some(maker) if maker == verb => Ok(Self { verb, entries }),
+            Some(maker) if maker == verb => {
+                let own = entries.shift_remove(OWN);
+                let manifest = Self { verb, entries };
+                // Folders of earlier versions have none.
+                let is_own =
+                    |sum: &Value| *sum == manifest.clone().unfinished().checksum().as_str();
+                match own.as_ref().is_none_or(is_own) {
+                    true => Ok(manifest),
+                    false => Err("its manifest.json was altered".into()),
+                }
+            }
             Some(other) => Err(format!("it is a {} folder", excerpt(other))),
             None => Err("its manifest.json has another schema".into()),
         }
@@ -137,8 +159,13 @@ mod tests {
 
     #[test]
     fn a_manifest_survives_its_file_and_other_files_are_refused() {
-        let text = manifest().text();
+        let text = manifest().file_text();
         assert_eq!(Manifest::parse("reproduce", &text), Ok(manifest()));
+        let finished = manifest().with(CHECKSUMS, vec!["a", "b"]);
+        let parsed = Manifest::parse("reproduce", &finished.file_text());
+        assert_eq!(parsed, Ok(finished));
+        let altered = Manifest::parse("reproduce", &text.replace("\"runs\": 2", "\"runs\": 3"));
+        assert_eq!(altered, Err("its manifest.json was altered".into()));
         let other = Manifest::parse("withheld", &text).unwrap_err();
         assert!(other.contains("a reproduce folder"), "{other}");
         for text in ["", "[]", "{}", r#"{"schema": "truetwin.gap/2"}"#] {
