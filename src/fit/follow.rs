@@ -59,12 +59,11 @@ pub(crate) fn free_runs(
 
 /// Adaptive substeps of all records; `None` for fixed ones, and where a run diverges.
 pub(super) fn steps_taken(problem: &Problem, theta: &[f64]) -> Option<StepsTaken> {
-    let equations = problem.twin.equations()?;
     let mut records = problem.records.iter().enumerate();
     records.try_fold(StepsTaken::default(), |all, (r, record)| {
         let own = problem.of_record(r, theta);
-        let taken = equations.steps_taken(&own, record.drive()).ok()?;
-        Some(all.and(taken?))
+        let taken = problem.twin.steps_taken(&own, record.drive())?;
+        Some(all.and(taken))
     })
 }
 

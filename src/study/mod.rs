@@ -24,8 +24,8 @@ use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern, aug
 use crate::record::{Drive, Record, RecordError};
 use crate::setting::{did_you_mean, number};
 use crate::twin::{
-    Adaptation, Composed, DigitalTwin, Hold, Integrator, MOST_SUBSTEPS, Noise, NoiseLevel, Role,
-    Stepping, TOLERANCES, Twin, TwinError, adapt, check_twin, fix,
+    Adaptation, DigitalTwin, Hold, Integrator, MOST_SUBSTEPS, Noise, NoiseLevel, Role, Stepping,
+    TOLERANCES, Twin, TwinError, adapt, check_twin, fix,
 };
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -480,8 +480,7 @@ impl Study {
     /// Prepares the source of drives.
     pub(crate) fn drives(&self) -> Result<DriveSource, StudyError> {
         let source = self.needed_plan()?.prepare(&self.twin.signals())?;
-        let holds = self.twin.equations().map(Composed::holds);
-        Ok(source.with_doses(holds.iter().flatten().map(|hold| *hold == Hold::Impulse)))
+        Ok(source.with_doses(self.twin.doses()))
     }
 
     /// Checks whether features can be taken of a record: it has the step and the channels of this study, and no output is missing.

@@ -318,8 +318,8 @@ enum InputSource {
 
 impl DriveSource {
     /// The same, where random levels of these inputs are doses: given at the first row of each, and nothing until the next.
-    pub(super) fn with_doses(mut self, doses: impl Iterator<Item = bool>) -> Self {
-        self.doses = doses.collect();
+    pub(super) fn with_doses(mut self, doses: Vec<bool>) -> Self {
+        self.doses = doses;
         self
     }
 

@@ -4,8 +4,8 @@ use super::composed::{Entry, FREE_RUNS, Parts, check_start};
 use super::definitions::defined_states;
 use crate::record::{Drive, RecordError, Signal, Signals};
 use crate::twin::{
-    Composed, ComposedBlackBox, DigitalTwin, Integrator, KnownNoise, Noise, Now, Outline,
-    Parameter, ParameterSpace, SimulationError, Stepping, TwinError, TwinPart,
+    Composed, ComposedBlackBox, DigitalTwin, Hold, Integrator, KnownNoise, Noise, Now, Outline,
+    Parameter, ParameterSpace, SimulationError, Stepping, StepsTaken, TwinError, TwinPart,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -153,6 +153,18 @@ impl Twin {
         let mut measurement = vec![0.0; outline.outputs.len()];
         twin.noise(&now, &start, &mut process, &mut measurement);
         Some([process, measurement])
+    }
+
+    /// Returns which inputs are amounts that are added at a row; none of a black box.
+    pub(crate) fn doses(&self) -> Vec<bool> {
+        let holds = self.equations().map(Composed::holds);
+        let all = holds.iter().flatten();
+        all.map(|hold| *hold == Hold::Impulse).collect()
+    }
+
+    /// Returns the adaptive substeps of a run without noise at θ; `None` for fixed steps, a run that diverges, and a black box.
+    pub(crate) fn steps_taken(&self, theta: &[f64], drive: &Drive) -> Option<StepsTaken> {
+        self.equations()?.steps_taken(theta, drive).ok()?
     }
 
     /// Integrator and stepping; `None` for a black box.

@@ -141,7 +141,7 @@ pub struct Outline {
     pub inputs: Vec<Quantity>,
     /// Outputs, in the order of y.
     pub outputs: Vec<Quantity>,
-    /// What inputs are between samples, by name; the others are as [`stepping`](StateSpace::stepping) says.
+    /// Rules of inputs between samples, by name; the others are as [`stepping`](StateSpace::stepping) says.
     pub held: BTreeMap<String, Hold>,
 }
 
@@ -198,7 +198,7 @@ impl Outline {
         self
     }
 
-    /// What each input is between samples; `usual` without a word of its own.
+    /// Rule of each input between samples; `usual` without one of its own.
     pub(crate) fn holds(&self, usual: Hold) -> Vec<Hold> {
         let held = |input: &Quantity| self.held.get(&input.name).copied().unwrap_or(usual);
         self.inputs.iter().map(held).collect()

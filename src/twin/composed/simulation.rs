@@ -81,7 +81,7 @@ impl LeadIn {
 /// A drive as the equations of a twin see it at θ.
 pub(crate) struct Acting<'d> {
     drive: Cow<'d, Drive>,
-    /// What each input is between samples; empty where all are held.
+    /// Rule of each input between samples; empty where all are held.
     holds: Vec<Hold>,
     /// Inputs before the first row, which no amount is added at.
     inputs_before: Vec<f64>,

@@ -36,12 +36,10 @@ pub(crate) fn step_error(
 pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Finding> {
     let outcome: Outcome = match coarse_step(twin, theta, drive)? {
         Ok(Some(coarse)) => warned(coarse),
-        Ok(None) => Ok(
-            match twin.equations().map(|own| own.steps_taken(theta, drive)) {
-                Some(Ok(Some(taken))) => taken.text(),
-                _ => "half the step moves no output by more than its noise".into(),
-            },
-        ),
+        Ok(None) => Ok(match twin.steps_taken(theta, drive) {
+            Some(taken) => taken.text(),
+            None => "half the step moves no output by more than its noise".into(),
+        }),
         Err(error) => warned(format!("not known: {error}")),
     };
     Some(Finding::of("step", outcome))

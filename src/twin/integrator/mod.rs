@@ -9,7 +9,7 @@ mod tests;
 
 use crate::twin::Interval;
 use path::{Path, Rates};
-use schedule::{Schedule, limited};
+use schedule::{SubstepSchedule, limited};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::ops::RangeInclusive;
@@ -55,7 +55,7 @@ impl<'a> Now<'a> {
 pub(crate) struct Between<'a> {
     /// Inputs at the next sample.
     pub next: &'a [f64],
-    /// What each input is between this sample and the next.
+    /// Rule of each input between this sample and the next.
     pub holds: &'a [Hold],
 }
 
@@ -182,7 +182,7 @@ pub(crate) struct Workspace {
     /// Substeps and lines of inputs; `None` where a sample is one step and inputs are held.
     refined: Option<Refined>,
     /// Substeps to a tolerance, beside `refined`.
-    schedule: Option<Schedule>,
+    schedule: Option<SubstepSchedule>,
 }
 
 /// Buffers of a step.
@@ -209,7 +209,7 @@ impl Workspace {
         limits: &[Interval],
         (integrator, stepping): (Integrator, Stepping),
     ) -> Self {
-        let schedule = Schedule::of(integrator, stepping, limits.len());
+        let schedule = SubstepSchedule::of(integrator, stepping, limits.len());
         let is_refined = schedule.is_some()
             || stepping.substeps > 1
             || integrator != Integrator::Discrete && holds.iter().any(|hold| *hold != Hold::Zero);
@@ -233,7 +233,7 @@ impl Workspace {
 
     /// Returns the adaptive substeps so far; `None` for fixed ones.
     pub(crate) fn steps_taken(&self) -> Option<StepsTaken> {
-        self.schedule.as_ref().map(Schedule::taken)
+        self.schedule.as_ref().map(SubstepSchedule::taken)
     }
 
     /// Buffers of a single step.

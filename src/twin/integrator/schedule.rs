@@ -62,7 +62,7 @@ impl StepsTaken {
     }
 }
 
-/// Whether errors of steps that fail fall as they do where rates jump: in proportion to their length.
+/// Errors of steps that fail: where rates jump, they fall in proportion to the length of the step.
 #[derive(Debug, Default)]
 struct Roughness {
     /// Length and error of the last step, if that failed.
@@ -92,7 +92,7 @@ impl Roughness {
 
 /// Substeps of the way to the next sample.
 #[derive(Debug, Clone)]
-pub(super) struct Schedule {
+pub(super) struct SubstepSchedule {
     tolerance: f64,
     /// Least number of substeps.
     least: usize,
@@ -111,7 +111,7 @@ pub(super) struct Schedule {
     taken: StepsTaken,
 }
 
-impl Schedule {
+impl SubstepSchedule {
     /// For `states` states; `None` for rules of fixed steps.
     pub fn of(rule: Integrator, stepping: Stepping, states: usize) -> Option<Self> {
         let is_implicit = match rule {
