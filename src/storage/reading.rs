@@ -24,10 +24,7 @@ pub(crate) fn checksum_of_read(path: &Path) -> Option<String> {
 
 /// Opens a file for reading; says so where a link leads nowhere, and where a pipe was read before: its bytes are gone.
 pub(crate) fn open(path: &Path) -> io::Result<File> {
-    let is_stream = path
-        .metadata()
-        .is_ok_and(|data| !data.is_file() && !data.is_dir());
-    if is_stream && read_files().insert(path.into(), None).is_some() {
+    if is_pipe(path) && read_files().insert(path.into(), None).is_some() {
         let text = "it is a pipe, which can be read once";
         return Err(io::Error::new(io::ErrorKind::NotSeekable, text));
     }
@@ -38,6 +35,21 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
         }
         None => error,
     })
+}
+
+/// Returns whether what is read from a path is gone then.
+fn is_pipe(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = path.metadata().map(|data| data.file_type());
+        kind.is_ok_and(|kind| kind.is_fifo() || kind.is_socket())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = path;
+        false
+    }
 }
 
 /// Returns where a link leads, if nothing is there.

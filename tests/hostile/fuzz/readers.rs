@@ -227,14 +227,7 @@ fn hold_message<T, E: ToString>(reader: &str, outcome: Result<T, E>) {
 
 /// A piece of work that was kept.
 pub fn piece(data: &[u8]) -> Result<(), String> {
-    let folder = place().join("work");
-    if !folder.exists() {
-        fs::create_dir_all(folder.join("runs")).map_err(text)?;
-        let manifest = r#"{"schema": "truetwin.reproduce-folder/2"}"#;
-        fs::write(folder.join("manifest.json"), manifest).map_err(text)?;
-    }
-    fs::write(folder.join("runs/0000.json"), data).map_err(text)?;
-    runs::run(&folder).map_err(text)
+    runs::run(&place().join("work"), data).map_err(text)
 }
 
 /// A bank in one file: an archive, an array that is put into one, or a table.
