@@ -14,7 +14,7 @@ const SAFETY: f64 = 0.9;
 /// Least and most that a step changes the next by: estimates of errors are rough.
 const CHANGE: (f64, f64) = (0.2, 5.0);
 /// Explicit steps of one sample from which the implicit method is tried, whose step costs some three of these with few states. Twice as many
-/// find stiffness later; with half, one step in ten of the trials is in vain on what is fast and not stiff.
+/// find stiffness later; half tries it where rates are fast and not stiff.
 const MANY: usize = 32;
 /// Least factor in the number of steps by which the implicit method wins: what its steps cost more.
 const WORTH: f64 = 4.0;
@@ -142,6 +142,9 @@ impl SubstepSchedule {
     /// Carries points, the first of which is the centre, to the next sample; states are put into their limits behind each step.
     pub fn carry(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], limits: &[(usize, Interval)]) {
         let n = self.sizes.len();
+        if n == 0 {
+            return;
+        }
         let way = (path.now.t, path.now.dt);
         if self.of != Some(way) {
             self.of = Some(way);
