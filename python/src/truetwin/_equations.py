@@ -49,7 +49,7 @@ _RELATIONS = {"Eq": "==", "Ne": "!=", "Lt": "<", "Le": "<=", "Gt": ">", "Ge": ">
 
 def _sympy(value: Any) -> str:
     """Return an expression of sympy in the language of the program; brackets wherever they may matter."""
-    import sympy  # type: ignore[import-untyped, unused-ignore]
+    import sympy  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
     def written(e: Any) -> str:
         if e.is_Symbol:
