@@ -4,7 +4,7 @@ use super::Composed;
 use super::parts::Theta;
 use crate::record::{Drive, Signal};
 use crate::setting::number;
-use crate::twin::integrator::Between;
+use crate::twin::integrator::{Between, remove_amounts};
 use crate::twin::{Hold, Interval, Noise, Now, Outline, SimulationError, Workspace};
 use std::borrow::Cow;
 
@@ -83,7 +83,7 @@ pub(crate) struct Acting<'d> {
     drive: Cow<'d, Drive>,
     /// Rule of each input between samples; empty where all are held.
     holds: Vec<Hold>,
-    /// Inputs before the first row, which no amount is added at.
+    /// Inputs before the first row, which no amount is added at; empty where the start is that row.
     inputs_before: Vec<f64>,
     /// All of θ, held entries too.
     theta: Theta,
@@ -103,11 +103,18 @@ impl<'d> Acting<'d> {
             None => Cow::Borrowed(drive),
         };
         let begun = twin.begins().unwrap_or(drive.first_time());
+        let before = LeadIn::of(&drive, begun).map_err(SimulationError::fatal)?;
+        let holds = between(twin.holds());
+        let mut inputs_before = vec![];
+        if before.steps > 0 {
+            inputs_before.extend_from_slice(drive.input(0));
+            remove_amounts(&mut inputs_before, &holds);
+        }
         Ok(Self {
-            before: LeadIn::of(&drive, begun).map_err(SimulationError::fatal)?,
-            inputs_before: without_amounts(drive.input(0), &twin.holds()),
+            before,
+            inputs_before,
             drive,
-            holds: between(twin.holds()),
+            holds,
             theta: twin.complete(theta),
         })
     }
@@ -196,16 +203,6 @@ impl<'d> Acting<'d> {
             now.between = Some(Between { next, holds });
         }
     }
-}
-
-/// Inputs of a row without what is added at it.
-fn without_amounts(inputs: &[f64], holds: &[Hold]) -> Vec<f64> {
-    let all = inputs.iter().zip(holds);
-    all.map(|(u, hold)| match hold {
-        Hold::Impulse => 0.0,
-        _ => *u,
-    })
-    .collect()
 }
 
 /// Rules of inputs, none where all are held.

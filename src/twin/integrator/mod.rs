@@ -79,13 +79,21 @@ impl Between<'_> {
         }
         let (mut with, mut without) = (vec![0.0; x.len()], vec![0.0; x.len()]);
         drift(now, x, &mut with);
-        for ((input, u), hold) in inputs.iter_mut().zip(now.u).zip(self.holds) {
-            *input = if *hold == Hold::Impulse { 0.0 } else { *u };
-        }
+        inputs.copy_from_slice(now.u);
+        remove_amounts(inputs, self.holds);
         let nothing = Now { u: inputs, ..*now };
         drift(&nothing, x, &mut without);
         for ((x, with), without) in x.iter_mut().zip(&with).zip(&without) {
             *x += with - without;
+        }
+    }
+}
+
+/// Sets inputs to zero that are amounts, which are added at a row alone.
+pub(crate) fn remove_amounts(inputs: &mut [f64], holds: &[Hold]) {
+    for (input, hold) in inputs.iter_mut().zip(holds) {
+        if *hold == Hold::Impulse {
+            *input = 0.0;
         }
     }
 }
@@ -109,7 +117,7 @@ pub enum Hold {
 
 impl Hold {
     /// Share of the next sample's input at a share of the way, in a step whose middle is at another.
-    pub(crate) fn share(self, at: f64, middle: f64) -> f64 {
+    fn share(self, at: f64, middle: f64) -> f64 {
         match self {
             Self::Zero | Self::Impulse => 0.0,
             Self::Linear => at,
