@@ -48,4 +48,5 @@ mod twin;
 pub(crate) use declared::Declared;
 pub use error::EquationsError;
 pub(crate) use file::{TABLES, take};
+pub(crate) use program::Program;
 pub use twin::Equations;

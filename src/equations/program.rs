@@ -9,12 +9,12 @@ use std::cell::Cell;
 
 /// Equations of a text, ready to be computed.
 #[derive(Debug)]
-pub(super) struct Program {
-    pub outline: Outline,
-    pub limits: Vec<Interval>,
-    pub integrator: Integrator,
-    pub stepping: Stepping,
-    pub tapes: Tapes,
+pub(crate) struct Program {
+    pub(super) outline: Outline,
+    pub(super) limits: Vec<Interval>,
+    pub(super) integrator: Integrator,
+    pub(super) stepping: Stepping,
+    pub(super) tapes: Tapes,
 }
 
 /// Operations of each method.

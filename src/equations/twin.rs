@@ -3,7 +3,9 @@
 use super::declared::Declared;
 use super::program::Program;
 use crate::record::{Drive, Signal, Signals};
-use crate::twin::{Composed, DigitalTwin, Noise, ParameterSpace, SimulationError};
+use crate::twin::{
+    Blocks, Composed, DigitalTwin, Noise, ParameterSpace, SimulationError, StateSpace,
+};
 use std::sync::Arc;
 
 /// A twin whose equations are text, as the files of studies have them; cheap to clone.
@@ -53,17 +55,27 @@ impl Equations {
         &self.text
     }
 
-    fn composed(&self) -> Composed {
-        let program = self.program.clone();
+    /// Returns the equations as twins are held.
+    pub(crate) fn composed(&self) -> Composed {
+        self.composed_of(self.program.clone())
+    }
+
+    /// Returns equations that differ from these in their rates or outputs alone, as twins are held.
+    pub(crate) fn composed_of<T: StateSpace + Blocks + 'static>(&self, own: Arc<T>) -> Composed {
         // Constraints act on one state after the other.
-        let all = match program.tapes.ends {
-            Some(_) => Composed::new(program),
-            None => Composed::in_blocks(program),
+        let all = match self.program.tapes.ends {
+            Some(_) => Composed::new(own),
+            None => Composed::in_blocks(own),
         };
         match self.declared.begins {
             Some(at) => all.beginning(at),
             None => all,
         }
+    }
+
+    /// Returns what computes the expressions.
+    pub(crate) fn program(&self) -> Arc<Program> {
+        self.program.clone()
     }
 
     /// Declarations of noise and starts.

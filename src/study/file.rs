@@ -178,6 +178,25 @@ impl StudyFile {
         self.equations.as_ref()
     }
 
+    /// The twin of the file, in equations.
+    pub(super) fn equations_of_twin(&self) -> Result<&Equations, StudyError> {
+        (self.own_equations()).ok_or_else(|| StudyError::NoEquations(self.twin.clone()))
+    }
+
+    /// Returns the file with the equations of the twin's own file, if this one names the twin alone; how they are integrated goes with them.
+    pub(super) fn with_equations_of(&self, own: &Self) -> Self {
+        let mut file = self.clone();
+        if file.equations.is_none() && own.equations.is_some() {
+            file.equations.clone_from(&own.equations);
+            let (record, own) = (&mut file.record, &own.record);
+            record.integrator = record.integrator.or(own.integrator);
+            record.substeps = record.substeps.or(own.substeps);
+            record.tolerance = record.tolerance.or(own.tolerance);
+            record.hold = record.hold.or(own.hold);
+        }
+        file
+    }
+
     /// Returns the text of a file that is read as this one.
     pub(crate) fn written(&self) -> Result<String, toml::ser::Error> {
         let Some(equations) = &self.equations else {

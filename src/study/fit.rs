@@ -2,7 +2,6 @@
 
 use super::{Study, StudyError};
 use crate::effect::Effect;
-use crate::equations::Declared;
 use crate::fit::{
     Fit, FitScore, FitSettings, ProfilesOf, Subject, Warning, other_hold, run, score,
 };
@@ -178,8 +177,7 @@ impl Study {
         let starts = (self.file.start.iter())
             .filter(|(_, level)| matches!(level, StartLevel::Declared { .. }));
         // The tables of a study stand over what its equations say.
-        let mut own =
-            (self.file.own_equations()).map_or(Declared::default(), |e| e.declared().clone());
+        let mut own = self.declared.clone();
         own.known.retain(|name| !noise.levels.contains_key(name));
         own.known.extend(noise.known(self.base.outline().as_ref()));
         own.factors.extend(factors);

@@ -21,6 +21,7 @@ pub use plan::RecordPlan;
 pub(crate) use tables::{Library, RecordTable};
 
 use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment};
+use crate::equations::Declared;
 use crate::record::{Drive, Record, RecordError};
 use crate::setting::{did_you_mean, number};
 use crate::twin::{
@@ -66,6 +67,8 @@ pub struct Study {
     catalogue: Catalogue,
     /// `true` where the starts of the twin's code stand, whatever the first rows say.
     trusts_starts: bool,
+    /// Noise and starts as the twin's equations declare them, where these are a text.
+    declared: Declared,
 }
 
 debug_by_name!(Study);
@@ -105,10 +108,25 @@ impl Study {
     /// # Ok::<(), truetwin::study::StudyError>(())
     /// ```
     pub fn of_file(file: &StudyFile) -> Result<Self, StudyError> {
-        match file.own_equations() {
-            Some(equations) => Self::named(&file.twin, equations.clone(), None)?.configure(file),
-            None => Err(StudyError::NoEquations(file.twin.clone())),
-        }
+        let equations = file.equations_of_twin()?;
+        let mut study = Self::named(&file.twin, equations.clone(), None)?;
+        study.declared = equations.declared().clone();
+        study.configure(file)
+    }
+
+    /// As [`of_file`](Self::of_file), with a twin in place of the file's equations, whose declarations it has.
+    pub(crate) fn of_file_with(
+        file: &StudyFile,
+        twin: impl DigitalTwin + 'static,
+    ) -> Result<Self, StudyError> {
+        let mut study = Self::named(&file.twin, twin, None)?;
+        study.declared = file.equations_of_twin()?.declared().clone();
+        // The text is not the twin: nobody is to read it as that.
+        study.configure(&StudyFile {
+            equations: None,
+            origin: None,
+            ..file.clone()
+        })
     }
 
     /// As [`of_file`](Self::of_file), from its path.
@@ -137,6 +155,7 @@ impl Study {
             text: None,
             catalogue: Catalogue::default(),
             trusts_starts: false,
+            declared: Declared::default(),
         })
     }
 
@@ -266,7 +285,7 @@ impl Study {
         Ok(Self {
             twin,
             plan,
-            file: file.clone(),
+            file: file.with_equations_of(&self.file),
             ..self.clone()
         })
     }

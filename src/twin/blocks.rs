@@ -1,7 +1,7 @@
 //! Equations that take all points of a step in one call.
 
 use crate::math::Lanes;
-use crate::twin::Now;
+use crate::twin::{Now, SimulationError};
 
 /// Equations that are faster for many points in one call than for one after the other: each choice of what to compute is paid once.
 ///
@@ -18,4 +18,10 @@ pub trait Blocks: Send + Sync {
 
     /// Sets `y` to the one output of these points.
     fn observe_lanes(&self, now: &[Now<'_>], x: &[Lanes], y: &mut [Lanes]);
+
+    /// Returns why the last run at the twin's own θ failed, where the equations know more than that a number is not finite: these methods
+    /// return no errors.
+    fn fault(&self, _theta: &[f64]) -> Option<SimulationError> {
+        None
+    }
 }

@@ -1,12 +1,14 @@
 //! Description that a program gives of itself.
 
 use super::super::name;
+use super::inside::{Inside, check_files};
 use crate::record::{Quantity, Signals};
 use crate::setting::number;
 use crate::storage::untrusted::message;
 use crate::study::{RecordPlan, RecordTable};
-use crate::twin::{Interval, Parameter, ParameterSpace};
+use crate::twin::{DigitalTwin, Interval, Parameter, ParameterSpace};
 use serde::Deserialize;
+use serde_json::{Map, Value};
 
 /// Most parameters, inputs or outputs of one program.
 const MOST: usize = 1000;
@@ -20,8 +22,10 @@ pub(super) struct Description {
     pub parameters: ParameterSpace,
     /// Inputs and outputs.
     pub signals: Signals,
-    /// Default plan of simulated records.
-    pub record: RecordPlan,
+    /// Default plan of simulated records; a program that shows its equations may leave it out.
+    pub record: Option<RecordPlan>,
+    /// The equations, if the program shows them.
+    pub inside: Option<Inside>,
 }
 
 /// As it stands in the line.
@@ -60,6 +64,10 @@ struct ToldQuantity {
 impl Description {
     /// From the program's line; the error says what is wrong and what to write.
     pub fn parse(line: &str) -> Result<Self, String> {
+        let shown: Option<Map<String, Value>> = serde_json::from_str(line).ok();
+        if let Some(shown) = shown.filter(Inside::is_shown) {
+            return Self::with_inside(Inside::parse(&shown)?);
+        }
         let told: Told = serde_json::from_str(line).map_err(|error| {
             let problem = error.to_string();
             message(&problem)
@@ -100,8 +108,33 @@ impl Description {
             name: told.name,
             parameters,
             signals,
-            record,
+            record: Some(record),
+            inside: None,
         })
+    }
+
+    /// The description of a program that shows its equations.
+    fn with_inside(inside: Inside) -> Result<Self, String> {
+        let record = &inside.file.record;
+        let record = match (record.step, record.samples) {
+            (Some(step), Some(samples)) => Some(RecordPlan {
+                input: record.input.clone(),
+                ..RecordPlan::autonomous(step, samples)
+            }),
+            _ => None,
+        };
+        let description = Self {
+            name: inside.name.clone(),
+            parameters: inside.equations.parameters(),
+            signals: inside.equations.signals(),
+            record,
+            inside: Some(inside),
+        };
+        description
+            .parameters
+            .check()
+            .map_err(|error| error.to_string())?;
+        Ok(description)
     }
 }
 
@@ -132,16 +165,10 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
             number(step)
         ));
     }
-    let files = (table.input.iter()).flat_map(|input| input.files());
-    if let Some((_, path)) = files.into_iter().next() {
-        return Err(format!(
-            "record: input is the file {}; say {{\"levels\": [low, high], \"hold\": n}}, and name files in a study file",
-            path.display()
-        ));
-    }
+    check_files(table)?;
     if table.hold.is_some() || table.integrator.is_some() || table.substeps.is_some() {
         return Err(
-            "record: hold, integrator and substeps need the twin's equations, which a program does not show; leave them out"
+            "record: hold, integrator and substeps need the twin's equations, which this program does not show; leave them out"
                 .into(),
         );
     }
@@ -168,7 +195,10 @@ mod tests {
         assert_eq!(found.parameters[0].bounds, Interval::new(0.1, 9.0).unwrap());
         assert_eq!(found.parameters[1].bounds, found.parameters[1].prior);
         assert_eq!(found.signals.inputs, [Quantity::new("u", "V")]);
-        assert_eq!(found.record, RecordPlan::levels(0.1, 60, -1.0, 1.0, 5));
+        assert_eq!(
+            found.record,
+            Some(RecordPlan::levels(0.1, 60, -1.0, 1.0, 5))
+        );
     }
 
     #[test]
@@ -181,7 +211,7 @@ mod tests {
             ("v", InputPlan::Constant(60.0)),
         ];
         let expected = RecordPlan::by_input(0.1, 60, plans);
-        assert_eq!(Description::parse(&text).unwrap().record, expected);
+        assert_eq!(Description::parse(&text).unwrap().record, Some(expected));
         let message = Description::parse(&text.replace(", \"v\": 60", "")).unwrap_err();
         assert!(message.contains("v has no plan"), "{message}");
     }

@@ -14,31 +14,35 @@
 //! ```
 //!
 //! or `{"id": 1, "diverged": 3.2}` (a time in seconds: this run is lost), or `{"id": 1, "error": "no licence"}` (the work
-//! ends). `seed` is below 2⁵³; `null` asks for a run without noise. Values k belong to time k·Δt; input k acts from there to
+//! ends). A description may also show the twin's equations, as text or for blocks of points (`inside.rs`, `frame.rs`). `seed` is below 2⁵³; `null` asks for a run without noise. Values k belong to time k·Δt; input k acts from there to
 //! (k + 1)·Δt. The same request must get the same answer, and draws must not depend on θ: runs with the same seed are
 //! compared with each other.
 
+mod asking;
 mod description;
+mod frame;
 pub(crate) mod fuzzing;
 mod health;
+mod inside;
 mod pool;
 mod protocol;
 mod running;
+mod served;
 mod worker;
 
 use super::check_call;
 use crate::record::{Drive, Signal, Signals};
 use crate::setting::SettingError;
 use crate::study::{RecordPlan, Study, StudyError};
-use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
-use description::Description;
-use health::Health;
-use pool::{Pool, introduce};
+use crate::twin::{Composed, DigitalTwin, Noise, ParameterSpace, SimulationError};
+use asking::{Asker, Reply};
+use pool::{Pool, ProgramRequest, introduce};
 use protocol::ProgramAnswer;
 pub(crate) use running::end_all;
-use std::sync::atomic::{AtomicU64, Ordering};
+use served::ServedEquations;
+use std::sync::Arc;
 use std::time::Duration;
-use worker::{ProgramCommand, Trouble};
+use worker::ProgramCommand;
 
 /// Most copies of a program.
 const MOST_WORKERS: usize = 1024;
@@ -99,7 +103,13 @@ impl ProgramSettings {
     }
 }
 
-/// An external program as a black box.
+/// An external program: a black box, or, where its description shows the equations, a twin with states.
+///
+/// | the description has … | the twin |
+/// |---|---|
+/// | outputs alone | a black box; the program is asked for each run |
+/// | the tables of a text, as JSON | the [`Equations`](crate::equations::Equations) of that text; the program is asked nothing more |
+/// | these, and `serves` | equations, of which the program computes rates or outputs for many points in one exchange |
 ///
 /// Copies of the program run side by side, at most [`ProgramSettings::workers`]; they start when they are needed and are
 /// gone when the twin is dropped. A copy that ends or is late is replaced and its request asked again, so that the results
@@ -118,18 +128,16 @@ impl ProgramSettings {
 /// Then `truetwin::cli::run([study])` is a command line over it, and `truetwin --program 'python3 examples/pendulum.py'` is
 /// the same without Rust.
 pub struct ProgramTwin {
-    pool: Pool,
-    description: Description,
-    retries: usize,
-    requests: AtomicU64,
-    health: Health,
+    asker: Arc<Asker>,
+    /// The equations that the program computes.
+    served: Option<Arc<ServedEquations>>,
 }
 
 impl std::fmt::Debug for ProgramTwin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("ProgramTwin")
-            .field("command", self.pool.command())
-            .field("description", &self.description)
+            .field("command", self.asker.pool.command())
+            .field("description", &self.asker.description)
             .finish_non_exhaustive()
     }
 }
@@ -155,23 +163,21 @@ impl ProgramTwin {
             met.map_err(|trouble| command.not_described(&trouble.text()))?;
         let pool = Pool::new(command, settings.timeout, most);
         pool.adopt(worker);
-        Ok(Self {
-            pool,
-            description,
-            retries: settings.retries,
-            requests: AtomicU64::new(1),
-            health: Health::default(),
-        })
+        let asker = Arc::new(Asker::new(pool, description, settings.retries));
+        let inside = asker.description.inside.as_ref();
+        let served = (inside.filter(|inside| !inside.serves.is_empty()))
+            .map(|inside| Arc::new(ServedEquations::new(asker.clone(), inside)));
+        Ok(Self { asker, served })
     }
 
     /// The name that the program gives itself.
     pub fn name(&self) -> &str {
-        &self.description.name
+        &self.asker.description.name
     }
 
-    /// Step, length and input of its records, unless a study says otherwise.
-    pub fn plan(&self) -> &RecordPlan {
-        &self.description.record
+    /// Step, length and input of its records, unless a study says otherwise; `None` where a program that shows its equations leaves them out.
+    pub fn plan(&self) -> Option<&RecordPlan> {
+        self.asker.description.record.as_ref()
     }
 
     /// The study of this twin with the program's own record plan.
@@ -180,66 +186,67 @@ impl ProgramTwin {
     ///
     /// As [`Study::new`].
     pub fn into_study(self) -> Result<Study, StudyError> {
-        let (name, plan) = (self.name().to_owned(), self.plan().clone());
-        Study::new(&name, self, plan)
+        let asker = self.asker.clone();
+        match (&asker.description.inside, self.plan()) {
+            (Some(inside), _) if inside.serves.is_empty() => Study::of_file(&inside.file),
+            (Some(inside), _) => Study::of_file_with(&inside.file, self),
+            (None, Some(plan)) => {
+                let (name, plan) = (self.name().to_owned(), plan.clone());
+                Study::new(&name, self, plan)
+            }
+            (None, None) => Err(StudyError::NoPlan),
+        }
     }
 
-    /// One request, asked of fresh workers until one answers or the attempts are used up.
+    /// One run of a black box.
     fn answer(
         &self,
         theta: &[f64],
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let signals = &self.description.signals;
-        let id = self.requests.fetch_add(1, Ordering::Relaxed);
+        let (asker, description) = (&self.asker, &self.asker.description);
+        asker.health.check()?;
+        check_call(&description.parameters, &description.signals, theta, drive)?;
+        let signals = &description.signals;
+        let id = asker.next_id();
         // Whole numbers up to 2⁵³ survive languages that know only floats.
         let seed = noise.seed().map(|seed| seed >> 11);
-        let line = protocol::simulate(id, &self.description, theta, drive, seed);
-        let longest = protocol::longest_answer(signals, drive.samples());
-        let read = |answer: &str| protocol::answer(answer, id, signals, drive);
-        let named = |problem: String| format!("`{}` {problem}", self.pool.command());
-        let mut attempt = 0;
-        loop {
-            attempt += 1;
-            let fresh = attempt > 1;
-            match (self.pool).ask(&line, longest, fresh, &self.description, read) {
-                Ok(ProgramAnswer::Error(text)) => {
-                    return Err(self.health.broken(named(format!("says: {text}"))));
-                }
-                Ok(ProgramAnswer::Outputs(outputs)) => {
-                    self.health.worked();
-                    return Ok(outputs);
-                }
-                Ok(ProgramAnswer::Diverged(at)) => {
-                    self.health.worked();
-                    return Err(SimulationError::Diverged { at });
-                }
-                Err(Trouble::Nonsense(problem)) => {
-                    return Err(self.health.broken(named(problem)));
-                }
-                Err(Trouble::Gone(_)) if attempt <= self.retries => self.health.check()?,
-                Err(Trouble::Gone(problem)) => {
-                    let tried = match attempt {
-                        1 => String::new(),
-                        _ => format!(" (attempt {attempt})"),
-                    };
-                    return Err(self
-                        .health
-                        .failed(theta, named(format!("{problem}{tried}"))));
-                }
-            }
-        }
+        let line = protocol::simulate(id, description, theta, drive, seed);
+        let request = ProgramRequest {
+            bytes: line.into_bytes(),
+            longest: protocol::longest_answer(signals, drive.samples()),
+        };
+        let read = |answer: &str| {
+            let reply = match protocol::answer(answer, id, signals, drive)? {
+                ProgramAnswer::Outputs(outputs) => Reply::Good(Ok(outputs), 0),
+                ProgramAnswer::Diverged(at) => Reply::Good(Err(at), 0),
+                ProgramAnswer::Error(text) => Reply::Error(text),
+            };
+            Ok(reply)
+        };
+        let (outputs, _) = asker.ask(theta, &request, read)?;
+        asker.health.worked();
+        outputs.map_err(|at| SimulationError::Diverged { at })
+    }
+
+    /// The equations, if the program shows them.
+    fn shown(&self) -> Option<Composed> {
+        let inside = self.asker.description.inside.as_ref()?;
+        Some(match &self.served {
+            Some(served) => served.composed(inside),
+            None => inside.equations.composed(),
+        })
     }
 }
 
 impl DigitalTwin for ProgramTwin {
     fn parameters(&self) -> ParameterSpace {
-        self.description.parameters.clone()
+        self.asker.description.parameters.clone()
     }
 
     fn signals(&self) -> Signals {
-        self.description.signals.clone()
+        self.asker.description.signals.clone()
     }
 
     fn simulate(
@@ -248,13 +255,13 @@ impl DigitalTwin for ProgramTwin {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        self.health.check()?;
-        let Description {
-            parameters,
-            signals,
-            ..
-        } = &self.description;
-        check_call(parameters, signals, theta, drive)?;
-        self.answer(theta, drive, noise)
+        match self.shown() {
+            Some(equations) => equations.run(theta, drive, noise),
+            None => self.answer(theta, drive, noise),
+        }
+    }
+
+    fn equations(self: Arc<Self>) -> Option<Composed> {
+        self.shown()
     }
 }

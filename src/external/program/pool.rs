@@ -10,6 +10,12 @@ use std::time::{Duration, Instant};
 /// Time that a program gets to end once its standard input is closed.
 const GRACE: Duration = Duration::from_millis(500);
 
+/// A request, and the longest line that answers it, in bytes.
+pub(super) struct ProgramRequest {
+    pub bytes: Vec<u8>,
+    pub longest: usize,
+}
+
 /// Starts workers when they are needed, keeps the idle ones, and ends all with itself.
 pub(super) struct Pool {
     command: ProgramCommand,
@@ -38,16 +44,15 @@ impl Pool {
         self.workers.adopt(worker);
     }
 
-    /// Sends a line to a worker that has said to be `expected`, and reads its answer with `read`. A worker that gave no
-    /// good answer is ended; `read`'s error is nonsense. A `fresh` worker has answered no request before.
+    /// Sends a request to a worker that has said to be `expected`, and reads the line of its answer with `read`, which says how many bytes
+    /// are behind the line. A worker that gave no good answer is ended; `read`'s error is nonsense.
     pub fn ask<T>(
         &self,
-        line: &str,
-        longest: usize,
+        request: &ProgramRequest,
         fresh: bool,
         expected: &Description,
-        read: impl FnOnce(&str) -> Result<T, String>,
-    ) -> Result<T, Trouble> {
+        read: impl FnOnce(&str) -> Result<(T, usize), String>,
+    ) -> Result<(T, Vec<u8>), Trouble> {
         // Some programs end after an answer; that is no failure of the next one.
         let (idle, place) = self.workers.take(fresh, Worker::lives);
         let mut worker = match idle {
@@ -62,10 +67,15 @@ impl Pool {
                 worker
             }
         };
-        let answer = worker.ask(line.to_owned(), longest, self.timeout)?;
-        let read = read(&answer).map_err(|problem| nonsense(&answer, &problem, &worker))?;
+        let answer = worker.ask(request.bytes.clone(), request.longest, self.timeout)?;
+        let (read, count) =
+            read(&answer).map_err(|problem| nonsense(&answer, &problem, &worker))?;
+        let bytes = match count {
+            0 => vec![],
+            count => worker.bytes(count, self.timeout)?,
+        };
         place.give_back(worker);
-        Ok(read)
+        Ok((read, bytes))
     }
 }
 
@@ -84,7 +94,11 @@ pub(super) fn introduce(
     timeout: Duration,
 ) -> std::io::Result<Result<(Worker, Description), Trouble>> {
     let mut worker = Worker::start(command)?;
-    let answer = worker.ask(protocol::describe(), LONGEST_DESCRIPTION, timeout);
+    let answer = worker.ask(
+        protocol::describe().into_bytes(),
+        LONGEST_DESCRIPTION,
+        timeout,
+    );
     Ok(answer.and_then(|line| match Description::parse(&line) {
         Ok(description) => Ok((worker, description)),
         Err(problem) => Err(nonsense(&line, &problem, &worker)),

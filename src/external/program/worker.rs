@@ -1,4 +1,4 @@
-//! The command that starts a program, and one running copy of it, asked line by line.
+//! The command that starts a program, and one running copy of it, asked line by line, with numbers behind a line.
 
 use super::running::Running;
 use crate::storage::files::with_remedy;
@@ -99,7 +99,7 @@ impl Trouble {
 pub(super) struct Worker {
     child: Running,
     /// Dropped, it closes the program's standard input.
-    requests: Option<Sender<String>>,
+    requests: Option<Sender<Vec<u8>>>,
     pieces: Receiver<Vec<u8>>,
     /// Read, and not yet part of an answer.
     waiting: Vec<u8>,
@@ -122,7 +122,7 @@ impl Worker {
         let (Some(stdin), Some(stdout), Some(stderr)) = child.with(pipes) else {
             return Err(missing());
         };
-        let (requests, to_write) = channel::<String>();
+        let (requests, to_write) = channel::<Vec<u8>>();
         let (read, pieces) = sync_channel(PIECES);
         let words = Arc::new(Mutex::new(Vec::new()));
         let kept = words.clone();
@@ -139,10 +139,15 @@ impl Worker {
         })
     }
 
-    /// Sends one line and waits for the next one: at most `time`, at most `longest` bytes.
-    pub fn ask(&mut self, line: String, longest: usize, time: Duration) -> Result<String, Trouble> {
+    /// Sends a request and waits for a line: at most `time`, at most `longest` bytes.
+    pub fn ask(
+        &mut self,
+        request: Vec<u8>,
+        longest: usize,
+        time: Duration,
+    ) -> Result<String, Trouble> {
         let deadline = Instant::now() + time;
-        let sent = self.requests.as_ref().map(|to| to.send(line));
+        let sent = self.requests.as_ref().map(|to| to.send(request));
         if !matches!(sent, Some(Ok(()))) {
             return Err(self.ended());
         }
@@ -169,22 +174,38 @@ impl Worker {
             if seen > longest {
                 return Err(too_long(longest, &self.waiting));
             }
-            let left = deadline.saturating_duration_since(Instant::now());
-            match self.pieces.recv_timeout(left) {
-                Ok(piece) => self.waiting.extend(piece),
-                Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
-                Err(RecvTimeoutError::Timeout) => {
-                    let seconds = time.as_secs_f64();
-                    let text = format!("gave no answer within {seconds} s{}", self.last_words());
-                    return Err(Trouble::Gone(text));
-                }
-            }
-            // Blank lines without end are no answer either.
-            if Instant::now() > deadline {
-                let text = format!("gave no whole answer in time{}", self.last_words());
+            self.receive(deadline, time)?;
+        }
+    }
+
+    /// Waits for the bytes behind a line: so many, at most `time`.
+    pub fn bytes(&mut self, count: usize, time: Duration) -> Result<Vec<u8>, Trouble> {
+        let deadline = Instant::now() + time;
+        while self.waiting.len() < count {
+            self.receive(deadline, time)?;
+        }
+        let rest = self.waiting.split_off(count);
+        Ok(std::mem::replace(&mut self.waiting, rest))
+    }
+
+    /// Waits for a piece of what the program writes.
+    fn receive(&mut self, deadline: Instant, time: Duration) -> Result<(), Trouble> {
+        let left = deadline.saturating_duration_since(Instant::now());
+        match self.pieces.recv_timeout(left) {
+            Ok(piece) => self.waiting.extend(piece),
+            Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
+            Err(RecvTimeoutError::Timeout) => {
+                let seconds = time.as_secs_f64();
+                let text = format!("gave no answer within {seconds} s{}", self.last_words());
                 return Err(Trouble::Gone(text));
             }
         }
+        // Blank lines without end are no answer either.
+        if Instant::now() > deadline {
+            let text = format!("gave no whole answer in time{}", self.last_words());
+            return Err(Trouble::Gone(text));
+        }
+        Ok(())
     }
 
     /// Returns whether the process still runs.
@@ -247,13 +268,9 @@ fn too_long(longest: usize, line: &[u8]) -> Trouble {
 }
 
 /// Writes requests until there are no more, or nobody reads them.
-fn write_all(mut to: impl Write, requests: &Receiver<String>) {
+fn write_all(mut to: impl Write, requests: &Receiver<Vec<u8>>) {
     for request in requests {
-        if to
-            .write_all(request.as_bytes())
-            .and_then(|()| to.flush())
-            .is_err()
-        {
+        if to.write_all(&request).and_then(|()| to.flush()).is_err() {
             return;
         }
     }

@@ -61,12 +61,13 @@ impl Kalman<'_> {
     ) -> Result<f64, FilterError> {
         let jobs = &[self.job(order, theta)?];
         let (states, outputs) = (self.states, self.channels);
-        with_size!(
+        let run = with_size!(
             (states, outputs),
             [1 2 3 4 5 6 7 8 9 10],
             |size| Pass::new(size, jobs).run(sink),
             Pass::new(Any { states, outputs }, jobs).run(sink)
-        )
+        );
+        run.map_err(|error| self.twin.fault(theta).map_or(error, Into::into))
     }
 
     /// This filter at θ, the rows in this order.

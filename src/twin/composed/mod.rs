@@ -230,6 +230,12 @@ impl Composed {
         self.parts.check(&theta, dt)
     }
 
+    /// Returns why the last run at this θ failed, if the equations know more than its divergence.
+    pub(crate) fn fault(&self, theta: &[f64]) -> Option<SimulationError> {
+        let theta = self.complete(theta);
+        self.own.fault(&theta[..self.parts.parameters])
+    }
+
     /// Simulates the equations.
     pub(crate) fn run(
         &self,
@@ -249,12 +255,13 @@ impl Composed {
             dead_time: DeadTime::of(self, theta, drive.dt()),
             work: self.workspace(),
         };
-        let mut outputs = if self.parts.acts.leave_runs() {
+        let outputs = if self.parts.acts.leave_runs() {
             setup.acting.first_entries(self.parts.parameters);
-            self.own.run(setup, noise)?
+            self.own.run(setup, noise)
         } else {
-            simulate(self, &mut setup, noise)?
+            simulate(self, &mut setup, noise)
         };
+        let mut outputs = outputs.map_err(|error| self.fault(theta).unwrap_or(error))?;
         self.finish(theta, noise, &mut outputs);
         Ok(outputs)
     }

@@ -3,7 +3,7 @@
 use super::engine::{Engine, as_rates};
 use crate::math::{LANES, Lanes};
 use crate::twin::points::{Layout, Points, lanes_one_by_one};
-use crate::twin::{Blocks, Integrator, Interval, Now, StateSpace, Workspace};
+use crate::twin::{Blocks, Integrator, Interval, Now, SimulationError, StateSpace, Workspace};
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -40,6 +40,11 @@ impl OwnEquations {
 
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.engine, &other.engine)
+    }
+
+    /// Returns why the last run at this θ failed, if the equations know.
+    pub fn fault(&self, theta: &[f64]) -> Option<SimulationError> {
+        self.blocks.as_ref()?.fault(theta)
     }
 
     pub fn drift_points(&self, now: &Now<'_>, at: Layout, x: &[f64], dx: &mut [f64]) {

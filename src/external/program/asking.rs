@@ -1,0 +1,85 @@
+//! Requests to a program, asked again where a copy of it fails.
+
+use super::description::Description;
+use super::health::Health;
+use super::pool::{Pool, ProgramRequest};
+use super::worker::Trouble;
+use crate::twin::SimulationError;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Copies of a program, what it says it is, and how well it answers.
+pub(super) struct Asker {
+    pub pool: Pool,
+    pub description: Description,
+    pub health: Health,
+    retries: usize,
+    requests: AtomicU64,
+}
+
+/// The first line of an answer.
+pub(super) enum Reply<T> {
+    /// An answer, and the number of bytes behind the line.
+    Good(T, usize),
+    /// The program says that it cannot go on.
+    Error(String),
+}
+
+impl Asker {
+    pub fn new(pool: Pool, description: Description, retries: usize) -> Self {
+        Self {
+            pool,
+            description,
+            health: Health::default(),
+            retries,
+            requests: AtomicU64::new(0),
+        }
+    }
+
+    /// Returns the number of the next request.
+    pub fn next_id(&self) -> u64 {
+        self.requests.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Returns a problem behind the name of the program.
+    pub fn named(&self, problem: &str) -> String {
+        format!("`{}` {problem}", self.pool.command())
+    }
+
+    /// One request at θ, asked of fresh copies until one answers or the attempts are used up; also the bytes behind the answer.
+    pub fn ask<T>(
+        &self,
+        theta: &[f64],
+        request: &ProgramRequest,
+        read: impl Fn(&str) -> Result<Reply<T>, String>,
+    ) -> Result<(T, Vec<u8>), SimulationError> {
+        let read = |line: &str| {
+            read(line).map(|reply| match reply {
+                Reply::Good(answer, bytes) => (Ok(answer), bytes),
+                Reply::Error(text) => (Err(text), 0),
+            })
+        };
+        let mut attempt = 0;
+        loop {
+            attempt += 1;
+            let fresh = attempt > 1;
+            match (self.pool).ask(request, fresh, &self.description, read) {
+                Ok((Ok(answer), bytes)) => return Ok((answer, bytes)),
+                Ok((Err(text), _)) => {
+                    return Err(self.health.broken(self.named(&format!("says: {text}"))));
+                }
+                Err(Trouble::Nonsense(problem)) => {
+                    return Err(self.health.broken(self.named(&problem)));
+                }
+                Err(Trouble::Gone(_)) if attempt <= self.retries => self.health.check()?,
+                Err(Trouble::Gone(problem)) => {
+                    let tried = match attempt {
+                        1 => String::new(),
+                        _ => format!(" (attempt {attempt})"),
+                    };
+                    let problem = self.named(&format!("{problem}{tried}"));
+                    return Err(self.health.failed(theta, problem));
+                }
+            }
+        }
+    }
+}

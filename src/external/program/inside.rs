@@ -1,0 +1,418 @@
+//! Equations in a program's description: the tables of a study file as JSON, and what the program computes of them itself.
+
+use super::super::name;
+use crate::equations::Equations;
+use crate::setting::did_you_mean;
+use crate::storage::untrusted::{excerpt, message};
+use crate::study::{RecordTable, StudyFile};
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// Keys of a description that show the twin's inside.
+const SIGNS: [&str; 4] = ["states", "define", "constants", SERVES];
+/// All keys of such a description, but for the name, in the order of a study file.
+const KEYS: [&str; 8] = [
+    "parameters",
+    "constants",
+    "define",
+    "states",
+    "inputs",
+    "outputs",
+    "record",
+    SERVES,
+];
+/// Key of the list of methods.
+const SERVES: &str = "serves";
+
+/// A method of the equations that the program computes for blocks of points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Method {
+    /// Rates of the states.
+    Drift,
+    /// States at the next sample.
+    Next,
+    /// Outputs without noise.
+    Observe,
+}
+
+impl Method {
+    const ALL: [Self; 3] = [Self::Drift, Self::Next, Self::Observe];
+
+    /// Name in requests.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Drift => "drift",
+            Self::Next => "next",
+            Self::Observe => "observe",
+        }
+    }
+
+    /// Table and key that it computes.
+    fn computes(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Drift => ("states", "rate"),
+            Self::Next => ("states", "next"),
+            Self::Observe => ("outputs", "value"),
+        }
+    }
+}
+
+/// The inside of a twin as its program describes it.
+#[derive(Debug, Clone)]
+pub(super) struct Inside {
+    /// Name of the twin.
+    pub name: String,
+    /// The description as a study file. What the program serves is 0 in it.
+    pub file: StudyFile,
+    /// The equations of the file.
+    pub equations: Equations,
+    /// Methods that the program computes; none of a twin that is text.
+    pub serves: Vec<Method>,
+}
+
+impl PartialEq for Inside {
+    fn eq(&self, other: &Self) -> bool {
+        self.serves == other.serves
+            && self.equations.text() == other.equations.text()
+            && self.file.record == other.file.record
+    }
+}
+
+/// A study file while it is written.
+#[derive(Default)]
+struct TableWriter {
+    text: String,
+    /// The place that each line is of.
+    places: Vec<String>,
+}
+
+impl TableWriter {
+    fn line(&mut self, place: String, line: &str) {
+        self.text += line;
+        self.text.push('\n');
+        self.places.push(place);
+    }
+
+    fn table(&mut self, name: &str, entries: &[(String, Value)]) -> Result<(), String> {
+        self.line(name.into(), &format!("[{name}]"));
+        for (key, value) in entries {
+            let place = format!("{name}: {}", excerpt(key));
+            let value = inline(value).map_err(|problem| format!("{place}: {problem}"))?;
+            self.line(place, &format!("{} = {value}", quoted(key)));
+        }
+        Ok(())
+    }
+}
+
+impl Inside {
+    /// Returns whether a description shows the twin's inside.
+    pub fn is_shown(told: &Map<String, Value>) -> bool {
+        SIGNS.iter().any(|key| told.contains_key(*key))
+    }
+
+    /// Reads a description; the error says what is wrong and what to write.
+    pub fn parse(told: &Map<String, Value>) -> Result<Self, String> {
+        let unknown = (told.keys()).find(|key| *key != "name" && !KEYS.contains(&key.as_str()));
+        if let Some(key) = unknown {
+            return Err(format!(
+                "unknown key `{}`{}; there are name, {}",
+                excerpt(key),
+                did_you_mean(key, KEYS),
+                KEYS.join(", ")
+            ));
+        }
+        let Some(name) = told.get("name").and_then(Value::as_str) else {
+            return Err("missing key `name`; give the twin one".into());
+        };
+        name::check(name).map_err(|problem| format!("name: {problem}"))?;
+        let serves = serves(told.get(SERVES))?;
+        let mut writer = TableWriter::default();
+        writer.line("name".into(), &format!("[twin]\nname = {}", quoted(name)));
+        writer.places.push("name".into());
+        for table in KEYS.into_iter().filter(|key| *key != SERVES) {
+            let Some(value) = told.get(table) else {
+                continue;
+            };
+            let mut entries = entries(table, value)?;
+            for method in &serves {
+                let (of, key) = method.computes();
+                if of == table {
+                    leave_open(&mut entries, (table, key), method.name())?;
+                }
+            }
+            writer.table(table, &entries)?;
+        }
+        let equations = Equations::parse(&writer.text).map_err(|error| {
+            let place = writer.places.get(error.line() - 1);
+            let place = place.map_or("", String::as_str);
+            format!("{place}: {}", error.problem())
+        })?;
+        let file = StudyFile::parse(&writer.text, Path::new("the description"));
+        let file = file.map_err(|error| message(&error.to_string()))?;
+        check_files(&file.record)?;
+        Ok(Self {
+            name: name.into(),
+            file,
+            equations,
+            serves,
+        })
+    }
+}
+
+/// Checks that a record's inputs are no files, which a program has no folder for.
+pub(super) fn check_files(record: &RecordTable) -> Result<(), String> {
+    let files = (record.input.iter()).flat_map(|input| input.files());
+    match files.into_iter().next() {
+        None => Ok(()),
+        Some((_, path)) => Err(format!(
+            "record: input is the file {}; say {{\"levels\": [low, high], \"hold\": n}}, and name files in a study file",
+            path.display()
+        )),
+    }
+}
+
+/// Reads the methods that a program serves.
+fn serves(value: Option<&Value>) -> Result<Vec<Method>, String> {
+    let names = match value {
+        None => return Ok(vec![]),
+        Some(Value::Array(names)) => names.clone(),
+        Some(name) => vec![name.clone()],
+    };
+    let mut methods = vec![];
+    for name in &names {
+        let method = (Method::ALL.into_iter()).find(|method| name.as_str() == Some(method.name()));
+        match method {
+            Some(method) if !methods.contains(&method) => methods.push(method),
+            _ => {
+                return Err(format!(
+                    "serves: {}; give drift or next, observe, or both as a list, each once",
+                    excerpt(&name.to_string())
+                ));
+            }
+        }
+    }
+    match methods.contains(&Method::Drift) && methods.contains(&Method::Next) {
+        true => Err("serves: drift and next; states have rates or next values, not both".into()),
+        false => Ok(methods),
+    }
+}
+
+/// Returns the entries of a table: an object, or a list of objects with names.
+fn entries(table: &str, value: &Value) -> Result<Vec<(String, Value)>, String> {
+    let list = match value {
+        Value::Object(map) => {
+            let entries = map.iter().map(|(key, value)| (key.clone(), value.clone()));
+            return entries.map(|entry| with_unit(table, entry)).collect();
+        }
+        Value::Array(list) if !["constants", "define", "record"].contains(&table) => list,
+        _ => {
+            return Err(format!(
+                "{table}: write an object, a name and its value each"
+            ));
+        }
+    };
+    let mut entries: Vec<(String, Value)> = vec![];
+    for value in list {
+        let mut keys = value.as_object().cloned().unwrap_or_default();
+        let Some(Value::String(name)) = keys.shift_remove("name") else {
+            return Err(format!("{table}: expected an object with name"));
+        };
+        if entries.iter().any(|(other, _)| *other == name) {
+            let name = excerpt(&name);
+            return Err(format!("{table}: duplicate name {name}; rename one"));
+        }
+        entries.push(with_unit(table, (name, Value::Object(keys)))?);
+    }
+    Ok(entries)
+}
+
+/// Checks the unit of an entry.
+fn with_unit(table: &str, entry: (String, Value)) -> Result<(String, Value), String> {
+    match entry.1.get("unit").and_then(Value::as_str) {
+        Some(unit) => name::check_unit(unit).map_err(|problem| format!("{table}: {problem}"))?,
+        None => {}
+    }
+    Ok(entry)
+}
+
+/// Gives entries a 0 for what the program computes.
+fn leave_open(
+    entries: &mut [(String, Value)],
+    (table, key): (&str, &str),
+    method: &str,
+) -> Result<(), String> {
+    for (name, value) in entries {
+        let name = excerpt(name);
+        let Some(keys) = value.as_object_mut() else {
+            return Err(format!("{table}: {name}: expected an object"));
+        };
+        if keys.insert(key.into(), 0.into()).is_some() {
+            return Err(format!(
+                "{table}: {name} has {key}, and {method} is served; leave one out"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A text as JSON and TOML both have it.
+fn quoted(text: &str) -> String {
+    Value::from(text).to_string()
+}
+
+/// A value in one line of TOML.
+fn inline(value: &Value) -> Result<String, String> {
+    Ok(match value {
+        Value::Null => return Err("null is no value; leave the key out".into()),
+        Value::Array(all) => {
+            let all: Vec<String> = all.iter().map(inline).collect::<Result<_, _>>()?;
+            format!("[{}]", all.join(", "))
+        }
+        Value::Object(entries) => {
+            let mut all = vec![];
+            for (key, value) in entries {
+                let value = match (key.as_str(), value) {
+                    ("limits", Value::Array(ends)) => limits(ends)?,
+                    _ => inline(value)?,
+                };
+                all.push(format!("{} = {value}", quoted(key)));
+            }
+            format!("{{ {} }}", all.join(", "))
+        }
+        // Their words and escapes are those of TOML.
+        value => value.to_string(),
+    })
+}
+
+/// Limits, of which null is an open end: JSON has no infinity.
+fn limits(ends: &[Value]) -> Result<String, String> {
+    let open = ["-inf", "inf"];
+    let mut all = vec![];
+    for (i, end) in ends.iter().enumerate() {
+        all.push(match (end, open.get(i)) {
+            (Value::Null, Some(open)) => (*open).to_owned(),
+            _ => inline(end)?,
+        });
+    }
+    Ok(format!("[{}]", all.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::{DigitalTwin, Integrator, Twin};
+
+    const PENDULUM: &str = r#"{"name": "pendulum", "parameters": [{"name": "l", "unit": "m", "prior": [0.5, 2]}],
+        "constants": {"g": 9.81}, "define": {"pull": "g/l*sin(q)"},
+        "states": {"q": {"rate": "v", "start": 0.3, "limits": [null, 3.2]}, "v": {"rate": "-pull + u", "noise": {"std": 0.01, "per": "second"}}},
+        "inputs": [{"name": "u"}], "outputs": {"y": {"unit": "rad", "value": "q", "noise": 0.02}},
+        "record": {"step": 0.05, "samples": 60, "input": {"levels": [-1, 1], "hold": 5}, "integrator": "euler"}}"#;
+
+    fn parse(text: &str) -> Result<Inside, String> {
+        Inside::parse(
+            serde_json::from_str::<Value>(text)
+                .unwrap()
+                .as_object()
+                .unwrap(),
+        )
+    }
+
+    #[test]
+    fn the_tables_of_a_description_are_those_of_a_study_file() {
+        let inside = parse(PENDULUM).unwrap();
+        let expected = r#"
+            [twin]
+            name = "pendulum"
+            [parameters]
+            l = { unit = "m", prior = [0.5, 2] }
+            [constants]
+            g = 9.81
+            [define]
+            pull = "g/l*sin(q)"
+            [states]
+            q = { rate = "v", start = 0.3, limits = [-inf, 3.2] }
+            v = { rate = "-pull + u", noise = { std = 0.01, per = "second" } }
+            [inputs]
+            u = {}
+            [outputs]
+            y = { unit = "rad", value = "q", noise = 0.02 }
+            [record]
+            step = 0.05
+            samples = 60
+            integrator = "euler"
+            input = { levels = [-1, 1], hold = 5 }
+        "#;
+        let file = StudyFile::parse(expected, Path::new("s.toml")).unwrap();
+        let own = file.own_equations().unwrap();
+        assert_eq!(inside.equations.text(), own.text());
+        assert_eq!(inside.file.record, file.record);
+        let twin = Twin::new(inside.equations.clone());
+        assert_eq!(twin.integration().unwrap().0, Integrator::Euler);
+    }
+
+    #[test]
+    fn what_is_served_is_left_open_in_the_text() {
+        let served = PENDULUM
+            .replace("\"rate\": \"v\", ", "")
+            .replace("\"rate\": \"-pull + u\", ", "")
+            .replace(
+                "\"name\": \"pendulum\"",
+                "\"name\": \"p\", \"serves\": \"drift\"",
+            );
+        let inside = parse(&served).unwrap();
+        assert_eq!(inside.serves, [Method::Drift]);
+        assert_eq!(inside.equations.signals().outputs[0].name, "y");
+        let both = served.replace("\"drift\"", "[\"next\", \"observe\"]");
+        let problem = parse(&both).unwrap_err();
+        assert!(
+            problem.contains("outputs: y has value, and observe is served"),
+            "{problem}"
+        );
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_table() {
+        for (from, to, part) in [
+            (
+                "\"v\", \"start\"",
+                "\"vv\", \"start\"",
+                "states: q: unknown name \"vv\" (did you mean \"v\"?)",
+            ),
+            (
+                "\"define\"",
+                "\"defines\"",
+                "unknown key `defines` (did you mean \"define\"?)",
+            ),
+            ("\"rate\": \"v\", ", "", "q has no rate"),
+            ("\"name\": \"pendulum\", ", "", "missing key `name`"),
+            ("{\"g\": 9.81}", "{\"g\": null}", "constants: g: null"),
+            (
+                "[{\"name\": \"u\"}]",
+                "[\"u\"]",
+                "inputs: expected an object with name",
+            ),
+            (
+                "{\"levels\": [-1, 1], \"hold\": 5}",
+                "\"/etc/x.csv\"",
+                "study file",
+            ),
+            ("\"euler\"", "\"eulre\"", "unknown integrator"),
+            ("\"rad\"", "\"\\u001b[2J\"", "outputs: the unit"),
+            (
+                "{\"name\": \"pendulum\"",
+                "{\"serves\": \"drfit\", \"name\": \"p\"",
+                "serves: \"drfit\"; give drift or next",
+            ),
+            (
+                "{\"name\": \"pendulum\"",
+                "{\"serves\": \"drift\", \"name\": \"p\"",
+                "states: q has rate, and drift is served",
+            ),
+        ] {
+            assert!(PENDULUM.contains(from), "{from}");
+            let problem = parse(&PENDULUM.replacen(from, to, 1)).unwrap_err();
+            assert!(problem.contains(part), "{problem}");
+            assert!(!problem.contains('\n'), "{problem}");
+        }
+    }
+}
