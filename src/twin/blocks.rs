@@ -19,6 +19,15 @@ pub trait Blocks: Send + Sync {
     /// Sets `y` to the one output of these points.
     fn observe_lanes(&self, now: &[Now<'_>], x: &[Lanes], y: &mut [Lanes]);
 
+    /// As [`drift`](Self::drift), of several filters with parameters of their own, `each` numbers of a filter: for equations of which a call
+    /// costs more than what it computes.
+    fn drift_joined(&self, _now: &[Now<'_>], _each: usize, _x: &[f64], _dx: &mut [f64]) {}
+
+    /// Returns whether [`drift_joined`](Self::drift_joined) is to be called.
+    fn is_joined(&self) -> bool {
+        false
+    }
+
     /// Returns why the last run at the twin's own θ failed, where the equations know more than that a number is not finite: these methods
     /// return no errors.
     fn fault(&self, _theta: &[f64]) -> Option<SimulationError> {

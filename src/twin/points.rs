@@ -55,7 +55,7 @@ pub(crate) struct Points<'w, N = f64> {
 
 /// Copies one lane out.
 #[inline(always)]
-fn gather(from: &[Lanes], lane: usize, to: &mut [f64]) {
+pub(super) fn gather(from: &[Lanes], lane: usize, to: &mut [f64]) {
     for (to, from) in to.iter_mut().zip(from) {
         *to = from.0[lane];
     }
@@ -63,7 +63,7 @@ fn gather(from: &[Lanes], lane: usize, to: &mut [f64]) {
 
 /// Copies one lane in; the first also into the lanes that no filter uses.
 #[inline(always)]
-fn scatter(from: &[f64], (lane, used): (usize, usize), to: &mut [Lanes]) {
+pub(super) fn scatter(from: &[f64], (lane, used): (usize, usize), to: &mut [Lanes]) {
     for (to, from) in to.iter_mut().zip(from) {
         to.0[lane] = *from;
     }

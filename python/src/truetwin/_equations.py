@@ -142,6 +142,12 @@ def _parameter(value: Parameter | Range | Mapping[str, Any]) -> dict[str, Any]:
     return {"prior": [float(end) for end in value]}
 
 
+def tables(entries: Mapping[str, Entry], key: str) -> dict[str, dict[str, Any]]:
+    """Return the entries of states or outputs as tables of keys; `key` is that of an entry that is an expression alone."""
+    whole = {name: entry if isinstance(entry, Mapping) else {key: entry} for name, entry in entries.items()}
+    return {name: _keys(entry, (key, "next", "start", "noise", "limits")) for name, entry in whole.items()}
+
+
 def _table(name: str, entries: Mapping[str, Any]) -> str:
     if not entries:
         return ""
@@ -167,10 +173,6 @@ class Text:
         define: Mapping[str, Expression],
         record: Mapping[str, Any],
     ) -> None:
-        def entries(all_: Mapping[str, Entry], key: str) -> dict[str, Any]:
-            tables = {k: entry if isinstance(entry, Mapping) else {key: entry} for k, entry in all_.items()}
-            return {k: _keys(entry, (key, "next", "start", "noise", "limits")) for k, entry in tables.items()}
-
         self.name = name
         self.inputs = list(inputs)
         self.outputs = list(outputs)
@@ -180,8 +182,8 @@ class Text:
             + _table("parameters", {key: _parameter(value) for key, value in parameters.items()})
             + _table("constants", {key: expression(value) for key, value in constants.items()})
             + _table("define", {key: expression(value) for key, value in define.items()})
-            + _table("states", entries(states, "rate"))
+            + _table("states", tables(states, "rate"))
             + _table("inputs", {key: unit if isinstance(unit, Mapping) else {"unit": unit} for key, unit in inputs.items()})
-            + _table("outputs", entries(outputs, "value"))
+            + _table("outputs", tables(outputs, "value"))
             + _table("record", record)
         )

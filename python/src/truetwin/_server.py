@@ -15,6 +15,7 @@ from types import TracebackType
 
 from . import relay
 from ._errors import TruetwinError
+from ._points import PointModel
 from ._simulator import Model
 
 #: Longest path of a Unix socket on every system that has them.
@@ -29,7 +30,7 @@ class Server:
     A Unix socket in a folder that only this user can enter; without Unix sockets, a local TCP socket and a random token.
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model | PointModel) -> None:
         if not sys.executable:
             raise TruetwinError("sys.executable is empty: this Python cannot start another one; use a Python with an executable")
         self._model = model
@@ -117,7 +118,7 @@ class Server:
             return
         with os.fdopen(pipes[0], "rb", PIECE) as requests, os.fdopen(pipes[1], "wb", 0) as answers:
             for line in requests:
-                left = memoryview(self._model.answer(line))
+                left = memoryview(self._model.answer(line, requests.read))
                 while left:
                     left = left[answers.write(left) :]
         connection.sendall(b"\n")
@@ -129,7 +130,7 @@ class Server:
                 return
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             for line in lines:
-                connection.sendall(self._model.answer(line))
+                connection.sendall(self._model.answer(line, lines.read))
 
     def _proved(self, line: bytes) -> bool:
         return self._token is not None and secrets.compare_digest(line.strip(), self._token.encode())

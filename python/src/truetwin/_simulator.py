@@ -87,8 +87,8 @@ class Model:
             "record": record,
         }
 
-    def answer(self, line: bytes) -> bytes:
-        """Return the answer to one request, both as lines of JSON."""
+    def answer(self, line: bytes, read: Callable[[int], bytes]) -> bytes:
+        """Return the answer to one request, both as lines of JSON; no bytes are behind them."""
         head, inputs, seed = _split(line)
         request = json.loads(head)
         if request.get("request") == "describe":
@@ -290,8 +290,8 @@ def _located(error: BaseException, simulator: Simulator) -> str:
     frames = list(traceback.extract_tb(error.__traceback__))
     code = getattr(inspect.unwrap(simulator), "__code__", None)
     own = [frame for frame in frames if code is not None and frame.filename == code.co_filename]
-    # The first frames are this module's own.
-    outside = [frame for frame in frames if frame.filename != __file__]
+    # The first frames are this package's own.
+    outside = [frame for frame in frames if os.path.dirname(frame.filename) != os.path.dirname(__file__)]
     text = " ".join(f"{type(error).__name__}: {error}".split())
     for frame in (own or outside)[-1:]:
         return f"{os.path.basename(frame.filename)}, line {frame.lineno}: {text}"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, overload
 from . import _process, _records
 from ._equations import Entry, Expression, Text
 from ._errors import TruetwinError
+from ._points import Equation, PointModel, States
 from ._records import Record, Records
 from ._report import Report
 from ._results import Check, Diagnosis, Estimate, Estimator, Fit, Json, Scorecard
@@ -42,6 +43,12 @@ class Twin:
         Equations in place of a callable, which needs no Python to run: the rate of each state as a text or an expression of sympy, or a dict
         of ``rate`` (or ``next``), ``start``, ``noise``, ``limits`` and ``unit``. `outputs` then is a dict of expressions or of dicts of
         ``value``, ``noise`` and ``unit``. `toml` returns the file.
+    drift, observe : callable, optional
+        Equations as functions over arrays: ``drift(t, x, u, theta)`` returns the rates of the states, ``observe`` the outputs without
+        noise. `x` has shape (states, points), the result too; `u` and `theta` have a row for each input and parameter, `t` is one row: all in
+        the order of their declarations, so that ``q, v = x`` names them. Points are computed together, and each by itself. `states`
+        then are names, a dict of units, or a dict of dicts as above without ``rate``. Without `observe`, `outputs` is a dict of expressions.
+        With ``record={"integrator": "discrete"}``, `drift` returns the states at the next sample.
     constants, define : dict of str to number or expression, optional
         Constants, and names for parts of equations.
     record : dict, optional
@@ -90,7 +97,9 @@ class Twin:
         parameters: Mapping[str, Parameter | Range] | None = None,
         inputs: str | Sequence[str] | Mapping[str, Any] = (),
         outputs: str | Sequence[str] | Mapping[str, Any] | None = None,
-        states: Mapping[str, Entry] | None = None,
+        drift: Equation | None = None,
+        observe: Equation | None = None,
+        states: States | None = None,
         constants: Mapping[str, Expression] | None = None,
         define: Mapping[str, Expression] | None = None,
         record: Mapping[str, Any] | None = None,
@@ -112,22 +121,31 @@ class Twin:
         self._noise: dict[str, float] = {}
         for level in noise.values() if isinstance(noise, Mapping) else [] if noise is None else [noise]:
             check_noise(level)
-        self._model: Model | None = None
+        self._model: Model | PointModel | None = None
         self._text: Text | None = None
+        self.name: str | None
         if states is not None:
             if simulator is not None or study is not None:
                 raise ValueError("states and a callable or a study; equations stand alone")
-            if not parameters or not isinstance(outputs, Mapping) or not outputs:
+            if not parameters or not outputs or not (observe or isinstance(outputs, Mapping)):
                 raise ValueError("equations need parameters={name: (low, high)} and outputs={name: expression}")
             plan: dict[str, Any] = {} if step is None else {"step": float(step), "samples": whole("samples", samples)}
             if levels is not None:
                 plan["input"] = planned(levels, hold)
-            self._text = Text(
-                name or "twin", parameters, _noisy(states, noise, outputs, True), inputs if isinstance(inputs, Mapping) else _units(inputs),
-                _noisy(outputs, noise, outputs, False), constants or {}, define or {}, {**plan, **(record or {})},
-            )  # fmt: skip
-            self.name: str | None = self._text.name
+            plan |= record or {}
+            moving, shown = _noisy(states, noise, outputs, "rate", drift), _noisy(outputs, noise, outputs, "value", observe)
+            if drift or observe:
+                self._model = PointModel(drift, observe, parameters, moving, inputs, shown, constants or {}, define or {}, plan, name)
+                self.name = self._model.name
+                return
+            if not isinstance(states, Mapping):
+                raise ValueError("states without rates; give states={name: rate}, or drift=f")
+            units = inputs if isinstance(inputs, Mapping) else _units(inputs)
+            self._text = Text(name or "twin", parameters, moving, units, shown, constants or {}, define or {}, plan)
+            self.name = self._text.name
             return
+        if drift or observe:
+            raise ValueError("drift and observe are functions of states; give states=[name]")
         if constants or define or record:
             raise ValueError("constants, define and record belong to equations; give states={name: rate}")
         if simulator is None:
@@ -248,7 +266,7 @@ class Twin:
             if validation is not None:
                 options += ["--validation", *call.records(validation, columns)]
             excluded = [without] if isinstance(without, str) else list(without or ())
-            if self._model is not None and not self._model.takes_seed and self._study is None:
+            if isinstance(self._model, Model) and not self._model.takes_seed and self._study is None:
                 # The noise level of such a twin is fitted in every hypothesis. As an effect it would count twice, and be a gap.
                 excluded.append("sensor-noise")
             if excluded:
@@ -489,7 +507,7 @@ class _Call:
             return ["--study", str(file)]
         if self._model is None:
             return ["--twin", str(twin.name)]
-        if noise and twin._noise:
+        if noise and twin._noise and isinstance(self._model, Model):
             study = self.path / "study.toml"
             study.write_text(_study(self._model, twin._noise), encoding="utf-8")
             return ["--study", str(study)]
@@ -518,12 +536,14 @@ class _Call:
         return folder, self.run(verb, [*options, "--out", str(folder)], seed)
 
 
-def _noisy(entries: Mapping[str, Entry], noise: float | Mapping[str, Any] | None, outputs: Mapping[str, Any], rates: bool) -> dict[str, Entry]:
+def _noisy(entries: States, noise: float | Mapping[str, Any] | None, outputs: States, key: str, function: Equation | None) -> dict[str, Entry]:
     """Return entries of states or outputs with the noise of the call: a number is that of each output."""
-    levels = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(outputs, float(noise))
-    key = "rate" if rates else "value"
+    names = list(_units(outputs) if not isinstance(outputs, Mapping) else outputs)
+    levels = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(names, float(noise))
+    # What a function computes has a unit in place of an expression.
+    key = "unit" if function else key
     noisy: dict[str, Entry] = {}
-    for name, entry in entries.items():
+    for name, entry in (entries if isinstance(entries, Mapping) else dict.fromkeys(_units(entries), {})).items():
         level = levels.get(name)
         noisy[name] = entry if level is None else {**(entry if isinstance(entry, Mapping) else {key: entry}), "noise": level}
     return noisy

@@ -2,12 +2,16 @@
 
 The program starts ``python relay.py ADDRESS`` as its simulator program. ADDRESS is the path of a Unix socket: the relay hands its
 pipes over, and the other process answers the program directly. Or ADDRESS is the port of a local TCP socket: the relay forwards
-lines, and the environment variable TRUETWIN_RELAY_TOKEN proves that the program's own child connects.
+lines and the bytes behind them, and the environment variable TRUETWIN_RELAY_TOKEN proves that the program's own child connects.
 """
 
+from __future__ import annotations
+
+import json
 import os
 import socket
 import sys
+from typing import BinaryIO
 
 
 def main() -> int:
@@ -40,20 +44,20 @@ def hand_over(connection: socket.socket) -> None:
 
 
 def forward(connection: socket.socket) -> None:
-    """Forwards one line each way in turn: the program sends no request before it has the last answer."""
-    while piece := os.read(0, 1 << 16):
-        connection.sendall(piece)
-        if piece.endswith(b"\n"):
-            answer(connection)
+    """Forwards one message each way in turn: the program sends no request before it has the last answer."""
+    requests, answers = sys.stdin.buffer, connection.makefile("rb")
+    while request := message(requests):
+        connection.sendall(request)
+        answer = message(answers)
+        if not answer:
+            raise EOFError("it has closed the connection")
+        write(answer)
 
 
-def answer(connection: socket.socket) -> None:
-    """Forwards one line from the connection to standard output."""
-    while piece := connection.recv(1 << 16):
-        write(piece)
-        if piece.endswith(b"\n"):
-            return
-    raise EOFError("it has closed the connection")
+def message(pipe: BinaryIO) -> bytes:
+    """Returns a line and the bytes that it announces; nothing at the end."""
+    line = pipe.readline()
+    return line + pipe.read(json.loads(line).get("bytes", 0)) if line.strip() else line
 
 
 def write(piece: bytes) -> None:

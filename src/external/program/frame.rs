@@ -133,7 +133,8 @@ mod tests {
     fn a_table_has_a_row_for_each_quantity_and_loses_no_bit() {
         let mut table = PointTable::new(2, &Now::new(0.0, 0.1, &[0.0], &[0.0, 0.0]), 2);
         for (point, t) in [0.5, 1.0 / 3.0].into_iter().enumerate() {
-            let now = Now::new(t, 0.1, &[7.0 + t], &[t, -0.0]);
+            let (u, theta) = ([7.0 + t], [t, -0.0]);
+            let now = Now::new(t, 0.1, &u, &theta);
             table.put(point, &now, |state| 10.0 * point as f64 + state as f64);
         }
         let request = table.request(4, Method::Drift);

@@ -259,6 +259,24 @@ impl Blocks for ServedEquations {
         idle_as_first(now.len(), y);
     }
 
+    fn is_joined(&self) -> bool {
+        self.motion == Some(Method::Drift)
+    }
+
+    fn drift_joined(&self, now: &[Now<'_>], each: usize, x: &[f64], dx: &mut [f64]) {
+        let Some(method) = self.motion else {
+            return;
+        };
+        let n = self.sizes.states;
+        let points = each / n;
+        let mut table = PointTable::new(points * now.len(), &now[0], n);
+        for (point, x) in x.chunks_exact(n).enumerate() {
+            table.put(point, &now[point / points], |state| x[state]);
+        }
+        let rows = self.ask(method, &now[0], &table);
+        set(rows.as_deref(), n, n, dx);
+    }
+
     fn fault(&self, theta: &[f64]) -> Option<SimulationError> {
         // Nothing else matters once the program is broken.
         if let Err(error) = self.asker.health.check() {

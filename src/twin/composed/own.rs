@@ -2,7 +2,7 @@
 
 use super::engine::{Engine, as_rates};
 use crate::math::{LANES, Lanes};
-use crate::twin::points::{Layout, Points, lanes_one_by_one};
+use crate::twin::points::{Layout, Points, gather, lanes_one_by_one, scatter};
 use crate::twin::{Blocks, Integrator, Interval, Now, SimulationError, StateSpace, Workspace};
 use std::ops::Deref;
 use std::sync::Arc;
@@ -96,6 +96,10 @@ impl OwnEquations {
         };
         let n = points.shifts.len();
         if !work.is_plain() {
+            if blocks.is_joined() && !work.is_implicit() && are_together(now) {
+                advance_joined(&**blocks, now, points, work);
+                return [false; LANES];
+            }
             let advance =
                 |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
             return lanes_one_by_one(n, now, points, one, advance);
@@ -119,6 +123,55 @@ impl OwnEquations {
         };
         let points = 1 + 2 * n;
         blocks.observe_lanes(now, &x[..points * n], &mut y[..points]);
+    }
+}
+
+/// Returns whether filters differ in their parameters alone.
+fn are_together(now: &[Now<'_>]) -> bool {
+    let first = &now[0];
+    now.iter().all(|now| {
+        let times = [now.t, now.dt, now.first_time, now.begun];
+        let is_between = match (now.between, first.between) {
+            (Some(own), Some(other)) => own.next == other.next && own.holds == other.holds,
+            (own, other) => own.is_none() && other.is_none(),
+        };
+        times == [first.t, first.dt, first.first_time, first.begun]
+            && now.u == first.u
+            && is_between
+    })
+}
+
+/// Carries the points of several filters as those of one, whose substeps are those of the first filter.
+fn advance_joined(
+    blocks: &dyn Blocks,
+    now: &[Now<'_>],
+    points: Points<'_, Lanes>,
+    work: &mut Workspace,
+) {
+    let n = points.shifts.len();
+    let moving = &mut points.all[..points.moving * n];
+    limit_lanes(points.limits, moving);
+    let each = moving.len();
+    let mut all = vec![0.0; each * now.len()];
+    for (lane, all) in all.chunks_exact_mut(each).enumerate() {
+        gather(moving, lane, all);
+    }
+    let whole = all.len();
+    work.carry(n, &now[0], &mut all, |stage, x, dx| {
+        if x.len() < whole {
+            // Substeps are chosen at the centre of the first filter.
+            return blocks.drift(stage, n, x, dx);
+        }
+        let each_now: Vec<Now<'_>> = (now.iter())
+            .map(|now| Now {
+                theta: now.theta,
+                ..*stage
+            })
+            .collect();
+        blocks.drift_joined(&each_now, each, x, dx);
+    });
+    for (lane, all) in all.chunks_exact(each).enumerate() {
+        scatter(all, (lane, now.len()), moving);
     }
 }
 

@@ -239,6 +239,13 @@ impl Workspace {
         self.refined.is_none() && self.integrator != Integrator::RungeKutta4
     }
 
+    /// Returns whether steps are implicit ones.
+    pub(super) fn is_implicit(&self) -> bool {
+        self.schedule
+            .as_ref()
+            .is_some_and(SubstepSchedule::is_implicit)
+    }
+
     /// Returns the adaptive substeps so far; `None` for fixed ones.
     pub(crate) fn steps_taken(&self) -> Option<StepsTaken> {
         self.schedule.as_ref().map(SubstepSchedule::taken)

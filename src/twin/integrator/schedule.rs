@@ -134,6 +134,11 @@ impl SubstepSchedule {
         })
     }
 
+    /// Returns whether the steps are implicit.
+    pub fn is_implicit(&self) -> bool {
+        self.is_implicit
+    }
+
     /// Substeps so far.
     pub fn taken(&self) -> StepsTaken {
         self.taken

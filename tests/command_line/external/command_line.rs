@@ -12,7 +12,7 @@ fn truetwin(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-fn done(arguments: &[&str]) -> String {
+pub(super) fn done(arguments: &[&str]) -> String {
     let output = truetwin(arguments);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {message}");
@@ -20,7 +20,7 @@ fn done(arguments: &[&str]) -> String {
 }
 
 /// Exit 2 and one line with these parts.
-fn refused(arguments: &[&str], parts: &[&str]) {
+pub(super) fn refused(arguments: &[&str], parts: &[&str]) {
     let output = truetwin(arguments);
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");

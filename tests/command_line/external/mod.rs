@@ -3,6 +3,7 @@
 mod command_line;
 mod honest;
 mod hostile;
+mod inside;
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -1,0 +1,142 @@
+"""Equations as Python functions over blocks of points: their description, and answers to the program's requests."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Union
+
+import numpy as np
+
+from ._equations import Entry, _parameter, expression, tables
+from ._errors import Diverged
+from ._simulator import Array, Parameter, Range, _located, _name, _units
+
+#: ``f(t, x, u, theta)``: arrays of shape (points,), (states, points), (inputs, points) and (parameters, points).
+Equation = Callable[[Array, Array, Array, Array], Array]
+#: States: names, names with units, or names with the keys of a state.
+States = Union[str, Sequence[str], Mapping[str, Entry]]
+
+
+class PointModel:
+    """Functions of the states with their description. Parameters: see `truetwin.Twin`."""
+
+    #: Functions draw no noise: it is declared.
+    takes_seed = False
+
+    def __init__(
+        self,
+        drift: Equation | None,
+        observe: Equation | None,
+        parameters: Mapping[str, Parameter | Range],
+        states: States,
+        inputs: str | Sequence[str] | Mapping[str, Any],
+        outputs: str | Sequence[str] | Mapping[str, Entry],
+        constants: Mapping[str, Any],
+        define: Mapping[str, Any],
+        record: Mapping[str, Any],
+        name: str | None,
+    ) -> None:
+        first = drift or observe
+        assert first is not None
+        self.name = name or _name(first)
+        self.step = record.get("step")
+        self.failure: BaseException | None = None
+        # In discrete time, drift returns the states at the next sample.
+        motion = "next" if record.get("integrator") == "discrete" else "drift"
+        described = {
+            "states": tables(_open(states) if drift else _entries("states", states), "rate"),
+            "outputs": tables(_open(outputs) if observe else _entries("outputs", outputs), "value"),
+        }
+        self.states, self.outputs = list(described["states"]), list(described["outputs"])
+        units = inputs if isinstance(inputs, Mapping) else _units(inputs)
+        self.inputs = list(units)
+        self._functions: dict[str, tuple[Equation, list[str]]] = {}
+        if drift:
+            self._functions[motion] = (drift, self.states)
+        if observe:
+            self._functions["observe"] = (observe, self.outputs)
+        self._parameters = len(parameters)
+        self.description = {
+            "name": self.name,
+            "serves": list(self._functions),
+            "parameters": {key: _parameter(value) for key, value in parameters.items()},
+            "constants": {key: expression(value) for key, value in constants.items()},
+            "define": {key: expression(value) for key, value in define.items()},
+            "inputs": {key: unit if isinstance(unit, Mapping) else {"unit": unit} for key, unit in units.items()},
+            **described,
+            "record": {key: value for key, value in record.items() if (key, value) != ("integrator", "discrete")},
+        }
+
+    def answer(self, line: bytes, read: Callable[[int], bytes]) -> bytes:
+        """Return the answer to one request; `read` returns the bytes behind its line."""
+        request = json.loads(line)
+        if request["request"] == "describe":
+            return json.dumps(_finite(self.description)).encode() + b"\n"
+        function, names = self._functions[request["request"]]
+        points = request["points"]
+        table = np.frombuffer(read(request["bytes"]), "<f8").reshape(-1, points)
+        inputs, parameters = len(self.inputs), self._parameters
+        u, theta, x = table[1 : 1 + inputs], table[1 + inputs : 1 + inputs + parameters], table[1 + inputs + parameters :]
+        try:
+            # Beyond the finite numbers, the program tries other parameters.
+            with np.errstate(all="ignore"):
+                values = _checked(_title(function), function(table[0], x, u, theta), names, points)
+        except (Diverged, OverflowError, FloatingPointError):
+            values = np.full((len(names), points), np.nan)
+        except BaseException as error:  # SystemExit in a thread would leave the program without an answer.
+            if self.failure is None:
+                self.failure = error
+            return f'{{"id":{request["id"]},"error":{json.dumps(_located(error, function))}}}\n'.encode()
+        numbers = values.astype("<f8", order="C", copy=False).tobytes()
+        return f'{{"id":{request["id"]},"bytes":{len(numbers)}}}\n'.encode() + numbers
+
+
+def _title(function: Equation) -> str:
+    return str(getattr(function, "__name__", type(function).__name__))
+
+
+def _checked(title: str, values: Any, names: Sequence[str], points: int) -> Array:
+    """Return the values of a function.
+
+    Raises
+    ------
+    TypeError, ValueError
+        No array of real numbers, or one of another shape; the message names the function and both shapes.
+    """
+    expected = f"return an array of shape ({len(names)}, {points}): {', '.join(names)} by points"
+    if not isinstance(values, np.ndarray):
+        what = "None" if values is None else f"a {type(values).__name__}"
+        raise TypeError(f"{title} returned {what}; {expected}, such as np.array([...])")
+    if len(names) == 1 and values.shape == (points,):
+        values = values.reshape(1, points)
+    if values.shape != (len(names), points):
+        raise ValueError(f"{title} returned shape {values.shape}; {expected}")
+    if values.dtype.kind not in "fiub":
+        raise TypeError(f"{title} returned an array of {values.dtype}; {expected}, of real numbers")
+    return np.asarray(values, dtype=float)
+
+
+def _open(names: States) -> dict[str, Entry]:
+    """Return the entries of states or outputs that a function computes: texts are units."""
+    if isinstance(names, Mapping):
+        return {key: entry if isinstance(entry, Mapping) else {"unit": str(entry)} for key, entry in names.items()}
+    return {key: {} for key in _units(names)}
+
+
+def _entries(table: str, entries: States) -> Mapping[str, Entry]:
+    if not isinstance(entries, Mapping):
+        function, key = ("drift", "rate") if table == "states" else ("observe", "expression")
+        raise ValueError(f"{table} without {function}: give {table}={{name: {key}}}, or {function}=f")
+    return entries
+
+
+def _finite(value: Any) -> Any:
+    """Return a description without infinities, which JSON has not: an open end of limits is null."""
+    if isinstance(value, Mapping):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value
