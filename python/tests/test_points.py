@@ -82,7 +82,7 @@ def test_a_wrong_result_is_one_line_with_the_function_and_both_shapes():
 def test_wrong_arguments_are_refused():
     with pytest.raises(ValueError, match="give states="):
         tank_twin(states=None, record=None)
-    with pytest.raises(ValueError, match="states without drift"):
+    with pytest.raises(ValueError, match="states without rates"):
         truetwin.Twin(observe=tank, parameters={"k": (0.2, 1.0)}, states=["h"], outputs="y")
     with pytest.raises(ValueError, match="only a twin of equations has a text"):
         tank_twin().toml()

@@ -278,11 +278,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 162, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 57_500, lines),
-        Ratchet::new("files", 466, files.collect()),
+        Ratchet::new("lines of code", 58_200, lines),
+        Ratchet::new("files", 470, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 482, constants(sources)),
+        Ratchet::new("named numeric constants", 483, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             3,

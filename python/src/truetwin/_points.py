@@ -29,9 +29,9 @@ class PointModel:
         drift: Equation | None,
         observe: Equation | None,
         parameters: Mapping[str, Parameter | Range],
-        states: States,
+        states: Mapping[str, Entry],
         inputs: str | Sequence[str] | Mapping[str, Any],
-        outputs: str | Sequence[str] | Mapping[str, Entry],
+        outputs: Mapping[str, Entry],
         constants: Mapping[str, Any],
         define: Mapping[str, Any],
         record: Mapping[str, Any],
@@ -45,8 +45,8 @@ class PointModel:
         # In discrete time, drift returns the states at the next sample.
         motion = "next" if record.get("integrator") == "discrete" else "drift"
         described = {
-            "states": tables(_open(states) if drift else _entries("states", states), "rate"),
-            "outputs": tables(_open(outputs) if observe else _entries("outputs", outputs), "value"),
+            "states": tables(_open(states) if drift else states, "rate"),
+            "outputs": tables(_open(outputs) if observe else outputs, "value"),
         }
         self.states, self.outputs = list(described["states"]), list(described["outputs"])
         units = inputs if isinstance(inputs, Mapping) else _units(inputs)
@@ -117,18 +117,9 @@ def _checked(title: str, values: Any, names: Sequence[str], points: int) -> Arra
     return np.asarray(values, dtype=float)
 
 
-def _open(names: States) -> dict[str, Entry]:
+def _open(entries: Mapping[str, Entry]) -> dict[str, Entry]:
     """Return the entries of states or outputs that a function computes: texts are units."""
-    if isinstance(names, Mapping):
-        return {key: entry if isinstance(entry, Mapping) else {"unit": str(entry)} for key, entry in names.items()}
-    return {key: {} for key in _units(names)}
-
-
-def _entries(table: str, entries: States) -> Mapping[str, Entry]:
-    if not isinstance(entries, Mapping):
-        function, key = ("drift", "rate") if table == "states" else ("observe", "expression")
-        raise ValueError(f"{table} without {function}: give {table}={{name: {key}}}, or {function}=f")
-    return entries
+    return {key: entry if isinstance(entry, Mapping) else {"unit": str(entry)} for key, entry in entries.items()}
 
 
 def _finite(value: Any) -> Any:

@@ -129,6 +129,8 @@ class Twin:
                 raise ValueError("states and a callable or a study; equations stand alone")
             if not parameters or not outputs or not (observe or isinstance(outputs, Mapping)):
                 raise ValueError("equations need parameters={name: (low, high)} and outputs={name: expression}")
+            if not (drift or isinstance(states, Mapping)):
+                raise ValueError("states without rates; give states={name: rate}, or drift=f")
             plan: dict[str, Any] = {} if step is None else {"step": float(step), "samples": whole("samples", samples)}
             if levels is not None:
                 plan["input"] = planned(levels, hold)
@@ -138,8 +140,6 @@ class Twin:
                 self._model = PointModel(drift, observe, parameters, moving, inputs, shown, constants or {}, define or {}, plan, name)
                 self.name = self._model.name
                 return
-            if not isinstance(states, Mapping):
-                raise ValueError("states without rates; give states={name: rate}, or drift=f")
             units = inputs if isinstance(inputs, Mapping) else _units(inputs)
             self._text = Text(name or "twin", parameters, moving, units, shown, constants or {}, define or {}, plan)
             self.name = self._text.name

@@ -1,13 +1,11 @@
 //! Blocks of points on the pipes of a program: a line of JSON, then numbers as little-endian f64.
 
 use super::asking::Reply;
-use super::inside::Method;
+use super::inside::ServedMethod;
 use crate::storage::untrusted::{excerpt, message};
 use crate::twin::Now;
 use serde::Deserialize;
 
-/// Bytes of a number.
-const NUMBER: usize = size_of::<f64>();
 /// Longest line before the numbers of an answer, in bytes: the text of an error is cut by none that is honest.
 pub(super) const LONGEST_LINE: usize = 1 << 16;
 
@@ -63,9 +61,9 @@ impl PointTable {
     }
 
     /// The request for what `method` computes at these points.
-    pub fn request(&self, id: u64, method: Method) -> Vec<u8> {
+    pub fn request(&self, id: u64, method: ServedMethod) -> Vec<u8> {
         let (name, points) = (method.name(), self.points);
-        let bytes = self.numbers.len() * NUMBER;
+        let bytes = self.numbers.len() * size_of::<f64>();
         let line = format!(
             "{{\"request\":\"{name}\",\"id\":{id},\"points\":{points},\"bytes\":{bytes}}}\n"
         );
@@ -105,7 +103,7 @@ pub(super) fn reply(
             told.id
         ));
     }
-    let expected = rows * points * NUMBER;
+    let expected = rows * points * size_of::<f64>();
     match (told.bytes, told.error) {
         (Some(bytes), None) if bytes == expected => Ok(Reply::Good((), bytes)),
         (Some(bytes), None) => Err(format!(
@@ -118,7 +116,7 @@ pub(super) fn reply(
 
 /// Reads numbers.
 pub(super) fn numbers(bytes: &[u8]) -> Vec<f64> {
-    let (chunks, _) = bytes.as_chunks::<NUMBER>();
+    let (chunks, _) = bytes.as_chunks();
     chunks
         .iter()
         .map(|bytes| f64::from_le_bytes(*bytes))
@@ -137,7 +135,7 @@ mod tests {
             let now = Now::new(t, 0.1, &u, &theta);
             table.put(point, &now, |state| 10.0 * point as f64 + state as f64);
         }
-        let request = table.request(4, Method::Drift);
+        let request = table.request(4, ServedMethod::Drift);
         let end = request.iter().position(|b| *b == b'\n').unwrap() + 1;
         let line = std::str::from_utf8(&request[..end]).unwrap();
         let expected = "{\"request\":\"drift\",\"id\":4,\"points\":2,\"bytes\":96}\n";

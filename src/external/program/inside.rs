@@ -26,7 +26,7 @@ const SERVES: &str = "serves";
 
 /// A method of the equations that the program computes for blocks of points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Method {
+pub(super) enum ServedMethod {
     /// Rates of the states.
     Drift,
     /// States at the next sample.
@@ -35,7 +35,7 @@ pub(super) enum Method {
     Observe,
 }
 
-impl Method {
+impl ServedMethod {
     const ALL: [Self; 3] = [Self::Drift, Self::Next, Self::Observe];
 
     /// Name in requests.
@@ -67,7 +67,7 @@ pub(super) struct Inside {
     /// The equations of the file.
     pub equations: Equations,
     /// Methods that the program computes; none of a twin that is text.
-    pub serves: Vec<Method>,
+    pub serves: Vec<ServedMethod>,
 }
 
 impl PartialEq for Inside {
@@ -172,7 +172,7 @@ pub(super) fn check_files(record: &RecordTable) -> Result<(), String> {
 }
 
 /// Reads the methods that a program serves.
-fn serves(value: Option<&Value>) -> Result<Vec<Method>, String> {
+fn serves(value: Option<&Value>) -> Result<Vec<ServedMethod>, String> {
     let names = match value {
         None => return Ok(vec![]),
         Some(Value::Array(names)) => names.clone(),
@@ -180,7 +180,8 @@ fn serves(value: Option<&Value>) -> Result<Vec<Method>, String> {
     };
     let mut methods = vec![];
     for name in &names {
-        let method = (Method::ALL.into_iter()).find(|method| name.as_str() == Some(method.name()));
+        let method =
+            (ServedMethod::ALL.into_iter()).find(|method| name.as_str() == Some(method.name()));
         match method {
             Some(method) if !methods.contains(&method) => methods.push(method),
             _ => {
@@ -191,7 +192,7 @@ fn serves(value: Option<&Value>) -> Result<Vec<Method>, String> {
             }
         }
     }
-    match methods.contains(&Method::Drift) && methods.contains(&Method::Next) {
+    match methods.contains(&ServedMethod::Drift) && methods.contains(&ServedMethod::Next) {
         true => Err("serves: drift and next; states have rates or next values, not both".into()),
         false => Ok(methods),
     }
@@ -360,7 +361,7 @@ mod tests {
                 "\"name\": \"p\", \"serves\": \"drift\"",
             );
         let inside = parse(&served).unwrap();
-        assert_eq!(inside.serves, [Method::Drift]);
+        assert_eq!(inside.serves, [ServedMethod::Drift]);
         assert_eq!(inside.equations.signals().outputs[0].name, "y");
         let both = served.replace("\"drift\"", "[\"next\", \"observe\"]");
         let problem = parse(&both).unwrap_err();

@@ -2,7 +2,7 @@
 
 use super::asking::Asker;
 use super::frame::{self, LONGEST_LINE, PointTable};
-use super::inside::{Inside, Method};
+use super::inside::{Inside, ServedMethod};
 use super::pool::ProgramRequest;
 use crate::equations::Program;
 use crate::math::Lanes;
@@ -18,7 +18,7 @@ pub(super) struct ServedEquations {
     /// Starts, noise, limits, and what is not served.
     text: Arc<Program>,
     /// Served rates, or next states.
-    motion: Option<Method>,
+    motion: Option<ServedMethod>,
     serves_outputs: bool,
     sizes: Sizes,
     /// Why the last run that failed did, with its θ.
@@ -40,8 +40,8 @@ impl ServedEquations {
         Self {
             asker,
             text,
-            motion: (inside.serves.iter().copied()).find(|method| *method != Method::Observe),
-            serves_outputs: inside.serves.contains(&Method::Observe),
+            motion: (inside.serves.iter().copied()).find(|method| *method != ServedMethod::Observe),
+            serves_outputs: inside.serves.contains(&ServedMethod::Observe),
             sizes: Sizes {
                 states: outline.states.len(),
                 outputs: outline.outputs.len(),
@@ -56,7 +56,7 @@ impl ServedEquations {
     }
 
     /// Asks for what a method computes at points: rows of numbers, one a point; `None` where the program gives none.
-    fn ask(&self, method: Method, now: &Now<'_>, table: &PointTable) -> Option<Vec<f64>> {
+    fn ask(&self, method: ServedMethod, now: &Now<'_>, table: &PointTable) -> Option<Vec<f64>> {
         match self.answer(method, now, table) {
             Ok(numbers) => Some(numbers),
             Err(error) => {
@@ -69,7 +69,7 @@ impl ServedEquations {
 
     fn answer(
         &self,
-        method: Method,
+        method: ServedMethod,
         now: &Now<'_>,
         table: &PointTable,
     ) -> Result<Vec<f64>, SimulationError> {
@@ -81,8 +81,8 @@ impl ServedEquations {
             longest: LONGEST_LINE,
         };
         let rows = match method {
-            Method::Observe => self.sizes.outputs,
-            Method::Drift | Method::Next => self.sizes.states,
+            ServedMethod::Observe => self.sizes.outputs,
+            ServedMethod::Drift | ServedMethod::Next => self.sizes.states,
         };
         let points = table.points();
         let read = |line: &str| frame::reply(line, id, (rows, points));
@@ -107,11 +107,16 @@ impl ServedEquations {
     }
 
     /// Says where a method has a value that is not finite.
-    fn odd(&self, method: Method, (row, value): (usize, f64), [t, x]: &[Vec<f64>; 2]) -> String {
+    fn odd(
+        &self,
+        method: ServedMethod,
+        (row, value): (usize, f64),
+        [t, x]: &[Vec<f64>; 2],
+    ) -> String {
         let outline = self.text.outline();
         let of = match method {
-            Method::Observe => &outline.outputs,
-            Method::Drift | Method::Next => &outline.states,
+            ServedMethod::Observe => &outline.outputs,
+            ServedMethod::Drift | ServedMethod::Next => &outline.states,
         };
         let states = (outline.states.iter().zip(x).take(4))
             .map(|(state, x)| format!("{} = {}", state.name, number(*x)))
@@ -215,7 +220,7 @@ impl Blocks for ServedEquations {
         if !self.serves_outputs {
             return Blocks::observe(&*self.text, now, stride, x, y);
         }
-        let rows = self.ask(Method::Observe, now, &self.table(now, stride, x));
+        let rows = self.ask(ServedMethod::Observe, now, &self.table(now, stride, x));
         set(rows.as_deref(), self.sizes.outputs, self.sizes.outputs, y);
     }
 
@@ -234,7 +239,7 @@ impl Blocks for ServedEquations {
                     let x = &mut x.0[lane];
                     // As a discrete twin that is called point after point.
                     *x += match method {
-                        Method::Next => now.dt * ((value - *x) / now.dt),
+                        ServedMethod::Next => now.dt * ((value - *x) / now.dt),
                         _ => now.dt * value,
                     };
                 }
@@ -248,7 +253,7 @@ impl Blocks for ServedEquations {
             return self.text.observe_lanes(now, x, y);
         }
         let table = self.table_of_lanes(now, x);
-        let rows = self.ask(Method::Observe, &now[0], &table);
+        let rows = self.ask(ServedMethod::Observe, &now[0], &table);
         let points = y.len();
         for lane in 0..now.len() {
             for (point, y) in y.iter_mut().enumerate() {
@@ -260,7 +265,7 @@ impl Blocks for ServedEquations {
     }
 
     fn is_joined(&self) -> bool {
-        self.motion == Some(Method::Drift)
+        self.motion == Some(ServedMethod::Drift)
     }
 
     fn drift_joined(&self, now: &[Now<'_>], each: usize, x: &[f64], dx: &mut [f64]) {
