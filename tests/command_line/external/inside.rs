@@ -236,7 +236,7 @@ fn a_text_in_a_description_is_a_twin_with_states() {
     let command = format!("{python} text.py");
     let with = |arguments: &[&str]| done(&[arguments, &["--program", &command]].concat());
     let effects = with(&["effects"]);
-    assert!(effects.contains("wave@v"), "{effects}");
+    assert!(effects.contains("on q, v; magnitudes force"), "{effects}");
     let simulate = ["simulate", "--theta", "l=1,c=0.4", "--out"];
     with(&[&simulate[..], &["swing.csv"]].concat());
     with(&["fit", "swing.csv", "--out", "swing-fit"]);
