@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -88,9 +90,10 @@ def test_wrong_arguments_are_refused():
         tank_twin().toml()
 
 
+@pytest.mark.skipif("TRUETWIN_SLOW" not in os.environ, reason="takes minutes; set TRUETWIN_SLOW=1")
 def test_an_effect_inside_is_named():
     """An outflow that begins above a level, which the twin lacks."""
     leaky = truetwin.Twin(**{**SETTING, "states": {"h": {**SETTING["states"]["h"], "rate": "u - k*h - 0.4*(h > 0.8)"}}, "samples": 120})
     diagnosis = tank_twin(samples=120).diagnose(leaky.simulate({"k": 0.4}), quick=True)
     assert diagnosis.verdict == "structural-gap"
-    assert any("@h" in effect.id or effect.target == "h" for effect in diagnosis.effects), diagnosis.effects
+    assert any(effect.target == "h" for effect in diagnosis.effects), diagnosis.effects
