@@ -58,6 +58,37 @@ pub(super) fn entries<'a, 't>(
     Ok(entries)
 }
 
+/// Returns the entries of a list of tables, `[[table]]`.
+pub(super) fn entry_list<'a, 't>(
+    source: SourceText<'t>,
+    file: &'a DeTable<'t>,
+    table: &'static str,
+) -> Result<Vec<TableEntry<'a, 't>>, EquationsError> {
+    let Some(value) = file.get(table) else {
+        return Ok(vec![]);
+    };
+    let byte = value.span().start;
+    let all = match value.get_ref().as_array() {
+        Some(all) if all.iter().all(|value| value.get_ref().is_table()) => all,
+        _ => {
+            let problem = format!("{table} is a list of tables; write [[{table}]] above each");
+            return source.error(byte, problem);
+        }
+    };
+    if all.len() > MOST {
+        let problem = format!("{} entries of {table}; there may be {MOST}", all.len());
+        return source.error(byte, problem);
+    }
+    let entry = |value: &'a Spanned<DeValue<'t>>| TableEntry {
+        source,
+        table,
+        name: table,
+        byte: value.span().start,
+        value,
+    };
+    Ok(all.iter().map(entry).collect())
+}
+
 impl<'a, 't> TableEntry<'a, 't> {
     /// An error at the entry's name.
     pub fn error<T>(&self, problem: impl Into<String>) -> Result<T, EquationsError> {

@@ -3,6 +3,7 @@
 use super::declared::{Declared, NoiseValue, StartValue};
 use super::entries::{TableEntry, entries};
 use super::error::EquationsError;
+use super::event::{EVENT, EventText, events};
 use super::graph::{Graph, Id, Varies};
 use super::names::{Meaning, Scope};
 use super::place::{SourceText, number};
@@ -22,7 +23,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Tables of a twin, in the order in which they are written.
-pub(crate) const TABLES: [&str; 7] = [
+pub(crate) const TABLES: [&str; 8] = [
     "twin",
     "parameters",
     "constants",
@@ -30,6 +31,7 @@ pub(crate) const TABLES: [&str; 7] = [
     "states",
     "inputs",
     "outputs",
+    EVENT,
 ];
 /// Table of records, of which the integrator is read here.
 const RECORD: &str = "record";
@@ -39,7 +41,8 @@ const UNNAMED: &str = "twin";
 const MOST: usize = 1 << 20;
 
 impl Equations {
-    /// Reads the tables `twin`, `parameters`, `constants`, `define`, `states`, `inputs`, `outputs`, and the integrator of `record`.
+    /// Reads the tables `twin`, `parameters`, `constants`, `define`, `states`, `inputs`, `outputs`, the list `event`, and the integrator of
+    /// `record`.
     ///
     /// A whole study file is read by [`StudyFile`](crate::study::StudyFile).
     ///
@@ -160,14 +163,19 @@ fn read(source: SourceText<'_>, file: &DeTable<'_>) -> Result<Equations, Equatio
         }
     }
     let hold = reader.inputs(&inputs)?;
+    let events = events(source, file, (&states, &mut reader.names))?;
+    let named = states;
     let states: Vec<StateText> =
-        (states.iter().map(|entry| reader.state(entry))).collect::<Result<_, _>>()?;
+        (named.iter().map(|entry| reader.state(entry))).collect::<Result<_, _>>()?;
+    reader.hold_switches(&named, &states, &events);
     let outputs: Vec<(Id, NoiseValue)> =
         (outputs.iter().map(|entry| reader.output(entry))).collect::<Result<_, _>>()?;
     let (integrator, stepping) = integrator(source, file, reader.motion == Some("next"))?;
     let name = name(source, file)?;
     let graph = &reader.names.graph;
     let tapes = tapes(graph, &states, &outputs);
+    let compiled = events.iter().map(|event| event.compiled(graph));
+    reader.outline.events.extend(compiled);
     let program = Program {
         limits: limits(graph, &states),
         outline: reader.outline,
@@ -269,6 +277,23 @@ impl Reader<'_> {
             noise: self.declared.noise(entry, keys, &mut self.names)?,
             limits: self.limits(entry, keys)?,
         })
+    }
+
+    /// States that only events move have no noise of their own, unless they say so.
+    fn hold_switches(
+        &mut self,
+        entries: &[TableEntry<'_, '_>],
+        states: &[StateText],
+        events: &[EventText],
+    ) {
+        let graph = &self.names.graph;
+        let is_zero = |id| graph.constant(id) == Some(0.0);
+        for state in events.iter().flat_map(EventText::states) {
+            let of = &states[state];
+            if is_zero(of.motion) && is_zero(of.noise.level) && self.motion == Some("rate") {
+                self.declared.known.insert(entries[state].name.into());
+            }
+        }
     }
 
     fn limits(
@@ -456,20 +481,27 @@ fn written(file: &DeTable<'_>) -> String {
             continue;
         };
         match value.get_ref() {
-            DeValue::Table(entries) => {
-                text += &format!("[{table}]\n");
-                let mut entries: Vec<_> = entries.iter().collect();
-                entries.sort_by_key(|(key, _)| key.span().start);
-                for (key, value) in entries {
-                    let (key, value) = (toml_key(key.get_ref()), inline(value.get_ref()));
-                    text += &format!("{key} = {value}\n");
-                }
-                text.push('\n');
+            DeValue::Table(entries) => text += &written_table(&format!("[{table}]"), entries),
+            DeValue::Array(all) => {
+                let tables = all.iter().filter_map(|value| value.get_ref().as_table());
+                tables.for_each(|keys| text += &written_table(&format!("[[{table}]]"), keys));
             }
             value => text += &format!("[{table}]\nname = {}\n\n", inline(value)),
         }
     }
     text
+}
+
+/// Returns a table with its keys, in the order of the file.
+fn written_table(head: &str, entries: &DeTable<'_>) -> String {
+    let mut text = format!("{head}\n");
+    let mut entries: Vec<_> = entries.iter().collect();
+    entries.sort_by_key(|(key, _)| key.span().start);
+    for (key, value) in entries {
+        let (key, value) = (toml_key(key.get_ref()), inline(value.get_ref()));
+        text += &format!("{key} = {value}\n");
+    }
+    text + "\n"
 }
 
 fn toml_key(key: &str) -> String {

@@ -23,12 +23,14 @@
 //! | words and signs of an expression; its operations in order | `lexer.rs`, `parser.rs`, `operation.rs` |
 //! | names, definitions, common parts, constants | `names.rs`, `graph.rs` |
 //! | operations over blocks | `tape.rs`, `groups.rs`, `scratch.rs`, `feed.rs` |
+//! | events: their conditions, times and changes | `event/` |
 //! | the equations that they are | `program.rs` |
 //! | the twin | `twin.rs`, `declared.rs` |
 
 mod declared;
 mod entries;
 mod error;
+mod event;
 mod feed;
 mod file;
 mod graph;

@@ -40,7 +40,7 @@ const FEW: usize = 2;
 
 impl OperationTape {
     /// Computes the outputs of one point.
-    fn point(&self, now: &Now<'_>, x: &[f64], outputs: &mut [f64]) {
+    pub fn point(&self, now: &Now<'_>, x: &[f64], outputs: &mut [f64]) {
         self.run::<1>(&mut PointsFeed {
             now,
             x,

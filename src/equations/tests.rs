@@ -175,8 +175,8 @@ fn faults_are_one_line_with_their_place() {
             "there are adaptive, stiff, discrete, euler and runge-kutta-4",
         ),
         (
-            "[states]\nh = { rate = \"1\" }\n[event]\n",
-            "\"event\" is no table of a twin",
+            "[states]\nh = { rate = \"1\" }\n[evnt]\n",
+            "\"evnt\" is no table of a twin (did you mean \"event\"?)",
         ),
         (
             "[states]\nh = { rate = \"1\" }\n[inputs]\nu = { hold = \"pulse\" }\n",

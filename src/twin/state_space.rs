@@ -2,7 +2,7 @@
 
 use crate::record::{Quantity, Signals};
 use crate::twin::{
-    Hold, Integrator, Interval, Now, Parameter, ParameterSpace, SimulationError, Stepping,
+    Event, Hold, Integrator, Interval, Now, Parameter, ParameterSpace, SimulationError, Stepping,
 };
 use std::collections::BTreeMap;
 
@@ -23,7 +23,8 @@ use std::collections::BTreeMap;
 /// [`constrain`](Self::constrain), [`limits`](Self::limits). Row 0 is the start.
 ///
 /// The integrator may take several steps within a sample, and inputs may lie on the line to the next sample ([`stepping`](Self::stepping)).
-/// The drift and the limits then act at each substep, as with a finer step; update, noise and constraints once a sample.
+/// The drift and the limits then act at each substep, as with a finer step; update, noise and constraints once a sample. The
+/// [events](Outline::event) of the outline act where they are, between samples, too.
 ///
 /// ```
 /// use truetwin::prelude::*;
@@ -143,6 +144,8 @@ pub struct Outline {
     pub outputs: Vec<Quantity>,
     /// Rules of inputs between samples, by name; the others are as [`stepping`](StateSpace::stepping) says.
     pub held: BTreeMap<String, Hold>,
+    /// Changes of states at times or where conditions become true.
+    pub events: Vec<Event>,
 }
 
 impl Outline {
@@ -176,6 +179,13 @@ impl Outline {
     #[must_use]
     pub fn hold(mut self, input: &str, hold: Hold) -> Self {
         self.held.insert(input.into(), hold);
+        self
+    }
+
+    /// Adds an event.
+    #[must_use]
+    pub fn event(mut self, event: Event) -> Self {
+        self.events.push(event);
         self
     }
 

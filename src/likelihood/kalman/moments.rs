@@ -85,6 +85,11 @@ impl<'a, S: Size, N: FilterNumber> Moments<'a, S, N> {
         }
     }
 
+    /// Returns what is wrong with points whose events have no end.
+    pub fn fault(&self) -> Option<&str> {
+        self.buffers.fault()
+    }
+
     /// Pairs of points that the method needs along a root.
     #[inline(always)]
     fn pairs(&self, root: Columns<'_, N>) -> usize {

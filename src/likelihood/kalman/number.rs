@@ -42,6 +42,13 @@ impl Buffers {
     }
 }
 
+impl Buffers {
+    /// Returns what is wrong with points whose events have no end.
+    pub fn fault(&self) -> Option<&str> {
+        self.work.fault()
+    }
+}
+
 impl FilterNumber for f64 {
     #[inline(always)]
     fn advance(call: Call<'_, '_>, points: Points<'_, Self>) -> bool {

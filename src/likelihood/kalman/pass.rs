@@ -10,7 +10,7 @@ use super::size::{Buffer, Size};
 use super::update::{MeasuredRow, Readings, Update};
 use super::{FilterError, Kalman};
 use crate::math::{Condition, Number};
-use crate::twin::{Acting, Now};
+use crate::twin::{Acting, Now, SimulationError};
 
 /// Innovation of one row.
 pub(super) struct Innovation<'w, N = f64> {
@@ -332,7 +332,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         let before = self.valid & good;
         self.valid = before & is_finite;
         if !self.valid.any() {
-            return Err(match before.any() {
+            return Err(match before.any() && self.moments.fault().is_none() {
                 true => FilterError::Diverged { at: self.now[0].t },
                 false => self.failure(state),
             });
@@ -476,6 +476,9 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
     #[inline(always)]
     fn failure(&self, state: &FilterState<S, N>) -> FilterError {
         let at = self.now[0].t;
+        if let Some(fault) = self.moments.fault() {
+            return FilterError::Simulation(SimulationError::Failed(fault.into()));
+        }
         let (n, p) = (self.size.states(), self.size.outputs());
         let covariance = &self.update.covariance.numbers()[..p * p];
         let mut finite = covariance.iter().all(|v| v.lane(0).is_finite());

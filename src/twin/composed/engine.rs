@@ -10,7 +10,7 @@ use crate::twin::points::{
     readout_lanes, readout_one_by_one,
 };
 use crate::twin::{
-    DigitalTwin, Integrator, Noise, Now, ParameterSpace, SimulationError, StateSpace, Workspace,
+    DigitalTwin, Event, EventCalls, Integrator, Noise, Now, ParameterSpace, SimulationError, StateSpace, Workspace,
 };
 use std::sync::Arc;
 
@@ -177,7 +177,8 @@ impl<T: StateSpace> Engine for T {
     }
 
     fn run(&self, mut setup: RunSetup<'_>, noise: Noise) -> Result<Signal, SimulationError> {
-        simulate(&Alone(self), &mut setup, noise)
+        let events = setup.outline.events.as_slice();
+        simulate(&Alone(self, events), &mut setup, noise)
     }
 }
 
@@ -228,9 +229,10 @@ fn run_alone<T: StateSpace>(
             &outline.holds(stepping.hold),
             &limits,
             (twin.integrator(), stepping),
+            &outline.events,
         ),
     };
-    simulate(&Alone(twin), &mut setup, noise)
+    simulate(&Alone(twin, &outline.events), &mut setup, noise)
 }
 
 /// One step of one state without noise and limits: memories, then motion.
@@ -270,7 +272,7 @@ pub(super) fn as_rates(now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
 }
 
 /// A user's equations without any parts, in a run.
-struct Alone<'t, T>(&'t T);
+struct Alone<'t, T>(&'t T, &'t [Event]);
 
 impl<T: StateSpace> RunningTwin for Alone<'_, T> {
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
@@ -290,7 +292,17 @@ impl<T: StateSpace> RunningTwin for Alone<'_, T> {
         self.0.readout(now, y);
     }
     fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
-        step(self.0, now, x, work);
+        if self.1.is_empty() {
+            return step(self.0, now, x, work);
+        }
+        self.0.update(now, x);
+        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| rates(self.0, now, x, dx);
+        let calls = EventCalls {
+            list: self.1,
+            states: x.len(),
+            inside: &|now, _, then| then(now),
+        };
+        work.carry_with_events(&calls, x.len(), now, x, drift);
     }
     fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
         self.0.constrain(now, x);

@@ -153,6 +153,11 @@ impl Composed {
         &self.parts
     }
 
+    /// Returns whether it has events, so that each pass needs a memory of its own.
+    pub(crate) fn has_events(&self) -> bool {
+        self.parts.acts.on_events
+    }
+
     /// Returns what each input is between samples.
     pub(crate) fn holds(&self) -> Vec<Hold> {
         self.parts.outline.holds(self.stepping().hold)
@@ -161,7 +166,8 @@ impl Composed {
     /// Returns buffers for its motion.
     pub(crate) fn workspace(&self) -> Workspace {
         let rule = (self.integrator(), self.stepping());
-        Workspace::of(&self.holds(), self.limits(), rule)
+        let events = &self.parts.outline.events;
+        Workspace::of(&self.holds(), self.limits(), rule, events)
     }
 
     /// Returns all of θ from the free entries.

@@ -6,7 +6,7 @@ use crate::math::{LANES, Lanes};
 use crate::twin::points::{
     Layout, Points, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes, shifted_value,
 };
-use crate::twin::{Now, Workspace};
+use crate::twin::{EventCalls, Now, Workspace};
 
 impl Composed {
     /// Sets `dx` to the rates of the states `x`, of one point or of several side by side.
@@ -143,9 +143,23 @@ impl Composed {
     pub(crate) fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
         self.resolved(now, |now| {
             self.remember(now, x);
-            let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.rates(now, x, dx);
-            work.carry(self.states(), now, x, drift);
+            self.carry(self.states(), now, x, work);
         });
+    }
+
+    /// Carries points of `n` states each over a step, with the twin's events.
+    #[inline(always)]
+    fn carry(&self, n: usize, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.rates(now, x, dx);
+        if !self.parts.acts.on_events {
+            return work.carry(n, now, x, drift);
+        }
+        let calls = EventCalls {
+            list: &self.parts.outline.events,
+            states: self.parts.states,
+            inside: &|now, x, then| self.inside(now, Some(x), |own| then(own)),
+        };
+        work.carry_with_events(&calls, n, now, x, drift);
     }
 
     /// Carries the points of a filter over a step; returns whether a constraint acted on any that matters to the noise.
@@ -181,8 +195,7 @@ impl Composed {
         points.limit(n);
         let (moving, shifted) = points.all.split_at_mut(points.moving * n);
         self.remember(now, moving);
-        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.rates(now, x, dx);
-        work.carry(n, now, moving, drift);
+        self.carry(n, now, moving, work);
         let pairs = || (shifts.iter().enumerate()).flat_map(|(i, s)| [(i, *s), (i, -s)]);
         let before = work.stage(n);
         before.copy_from_slice(&moving[..n]);

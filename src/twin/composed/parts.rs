@@ -72,6 +72,8 @@ pub(in crate::twin) struct Acts {
     pub in_memories: bool,
     /// `true` where disturbances move.
     pub in_disturbances: bool,
+    /// `true` for a twin with events.
+    pub on_events: bool,
 }
 
 impl Acts {
@@ -121,7 +123,8 @@ impl Acts {
     /// Returns whether the equations move as the twin's own do.
     pub fn leave_motion(self) -> bool {
         let remembers = self.in_sensors || self.in_memories || self.in_disturbances;
-        !(self.on_parameters || self.on_rates || self.on_limits || remembers)
+        let bent = self.on_parameters || self.on_rates || self.on_limits;
+        !(bent || remembers || self.on_events)
     }
 
     /// Returns whether a run is one of the twin's own equations.
@@ -134,6 +137,10 @@ impl Acts {
 impl Parts {
     /// Returns no parts of a twin.
     pub fn none(outline: Outline, limits: Vec<Interval>, rule: (Integrator, Stepping)) -> Self {
+        let acts = Acts {
+            on_events: !outline.events.is_empty(),
+            ..Acts::default()
+        };
         Self {
             held: vec![None; outline.parameters.len()],
             states: outline.states.len(),
@@ -146,7 +153,7 @@ impl Parts {
             delays: vec![],
             noise_step: None,
             begins: None,
-            acts: Acts::default(),
+            acts,
         }
     }
 

@@ -305,7 +305,7 @@ pub(super) fn simulate(
         }
         match x.iter().all(|v| v.is_finite()) {
             true => Ok(()),
-            false => Err(SimulationError::Diverged { at: now.t + now.dt }),
+            false => Err(ended(work, now.t + now.dt)),
         }
     };
     let first = acting.start();
@@ -347,6 +347,14 @@ pub(super) fn simulate(
     }
     Signal::from_shape_vec((samples, p), outputs)
         .map_err(|error| SimulationError::Fatal(error.into()))
+}
+
+/// The error of a run that left the finite numbers.
+fn ended(work: &Workspace, at: f64) -> SimulationError {
+    match work.fault() {
+        Some(fault) => SimulationError::Failed(fault.into()),
+        None => SimulationError::Diverged { at },
+    }
 }
 
 /// Holds outputs back by their dead times; before the start, the first values stand.

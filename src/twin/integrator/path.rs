@@ -19,6 +19,8 @@ pub(super) struct Path<'p, 'n> {
     /// Inputs at a part of it.
     pub inputs: &'p mut [f64],
     pub drift: &'p mut Rates<'p>,
+    /// Shares of the way that no step goes over, in order.
+    pub breaks: &'p [f64],
 }
 
 impl Path<'_, '_> {
@@ -43,9 +45,45 @@ impl Path<'_, '_> {
         (self.drift)(&stage, x, dx);
     }
 
-    /// Share of the way at which an input jumps: no step goes over it.
-    pub fn jump(&self) -> Option<f64> {
-        let between = self.now.between?;
-        between.holds.contains(&Hold::Nearest).then_some(0.5)
+    /// Calls `with` the time and the inputs at a share of the way.
+    pub fn at<R>(&mut self, share: f64, with: impl FnOnce(&Now<'_>) -> R) -> R {
+        let mut now = Now {
+            t: self.now.t + share * self.now.dt,
+            ..*self.now
+        };
+        if let Some(between) = self.now.between {
+            between.inputs_at(share, share, self.now.u, self.inputs);
+            now.u = self.inputs;
+        }
+        with(&now)
+    }
+
+    /// Returns stretches of equal length, but for the breaks.
+    pub fn equal(&self, parts: usize) -> Vec<Stretch> {
+        let mut all = vec![];
+        for i in 0..parts {
+            let (mut from, end) = (i as f64 / parts as f64, (i + 1) as f64 / parts as f64);
+            while from < end {
+                let to = self.next_break(from).min(end);
+                let length = to - from;
+                all.push(Stretch { from, length });
+                from = to;
+            }
+        }
+        all
+    }
+
+    /// Share of the way up to which a step from another may go.
+    pub fn next_break(&self, from: f64) -> f64 {
+        let mut breaks = self.breaks.iter().copied();
+        breaks.find(|at| from < *at).unwrap_or(1.0)
+    }
+}
+
+/// Shares of the way at which inputs jump.
+pub(super) fn jumps(now: &Now<'_>) -> &'static [f64] {
+    match now.between {
+        Some(between) if between.holds.contains(&Hold::Nearest) => &[0.5],
+        _ => &[],
     }
 }

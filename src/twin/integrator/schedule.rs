@@ -4,6 +4,7 @@
 use super::pair::{self, ExplicitPair};
 use super::path::{Path, Stretch};
 use super::rosenbrock::{self, Rosenbrock};
+use super::watch::{EventWatch, EventsOfWay, StepBy};
 use super::{Integrator, MOST_SUBSTEPS, Stepping};
 use crate::math::three_digits;
 use crate::twin::Interval;
@@ -90,6 +91,14 @@ impl Roughness {
     }
 }
 
+/// The point by which steps are chosen, its limits, and its events if there are any.
+#[derive(Clone, Copy)]
+pub(super) struct Centre<'c> {
+    pub x: &'c [f64],
+    pub limits: &'c [(usize, Interval)],
+    pub events: Option<(&'c EventsOfWay<'c>, &'c EventWatch)>,
+}
+
 /// Substeps of the way to the next sample.
 #[derive(Debug, Clone)]
 pub(super) struct SubstepSchedule {
@@ -153,7 +162,12 @@ impl SubstepSchedule {
         let way = (path.now.t, path.now.dt);
         if self.of != Some(way) {
             self.of = Some(way);
-            self.choose(path, &x[..n], limits);
+            let centre = Centre {
+                x: &x[..n],
+                limits,
+                events: None,
+            };
+            self.choose(path, centre);
         }
         for i in 0..self.stretches.len() {
             self.step(path, self.stretches[i], x, None);
@@ -161,7 +175,15 @@ impl SubstepSchedule {
         }
     }
 
-    fn step(
+    /// Returns steps chosen anew, at whose ends the events of the centre are.
+    pub fn chosen(&mut self, path: &mut Path<'_, '_>, centre: Centre<'_>) -> Vec<Stretch> {
+        self.of = None;
+        self.choose(path, centre);
+        self.stretches.clone()
+    }
+
+    /// Carries points over a stretch; `error` is that of the first.
+    pub fn step(
         &mut self,
         path: &mut Path<'_, '_>,
         of: Stretch,
@@ -175,21 +197,21 @@ impl SubstepSchedule {
     }
 
     /// Chooses the substeps of this way, and the method.
-    fn choose(&mut self, path: &mut Path<'_, '_>, x: &[f64], limits: &[(usize, Interval)]) {
+    fn choose(&mut self, path: &mut Path<'_, '_>, centre: Centre<'_>) {
         let limit = match self.may_change && !self.is_implicit {
             true => MANY,
             false => usize::MAX,
         };
         let sizes = self.sizes.clone();
-        let choice = self.tried(path, (x, limits), limit).or_else(|covered| {
+        let choice = self.tried(path, centre, limit).or_else(|covered| {
             let explicit = MANY as f64 / covered.max(SHORTEST);
             let most = (explicit / WORTH).min(MOST_SUBSTEPS as f64) as usize;
             self.sizes.clone_from(&sizes);
             self.is_implicit = true;
-            self.tried(path, (x, limits), most).or_else(|_| {
+            self.tried(path, centre, most).or_else(|_| {
                 self.is_implicit = false;
                 self.sizes.clone_from(&sizes);
-                self.tried(path, (x, limits), usize::MAX)
+                self.tried(path, centre, usize::MAX)
             })
         });
         // Without a limit a choice is always made.
@@ -208,15 +230,16 @@ impl SubstepSchedule {
     fn tried(
         &mut self,
         path: &mut Path<'_, '_>,
-        (x, limits): (&[f64], &[(usize, Interval)]),
+        centre: Centre<'_>,
         most: usize,
     ) -> Result<(Vec<Stretch>, f64), f64> {
-        let (n, dt) = (x.len(), path.now.dt);
+        let (n, dt) = (centre.x.len(), path.now.dt);
+        let mut events = centre.events.map(|(all, watch)| (all, watch.clone()));
         let order = match self.is_implicit {
             true => rosenbrock::ORDER,
             false => pair::ORDER,
         };
-        let (mut stretches, mut next, mut state) = (vec![], self.next, x.to_vec());
+        let (mut stretches, mut next, mut state) = (vec![], self.next, centre.x.to_vec());
         let (mut trial, mut error) = (vec![0.0; n], vec![0.0; n]);
         let (mut from, mut steps, mut shortest) = (0.0, 0, SHORTEST);
         let mut roughness = Roughness::default();
@@ -230,7 +253,7 @@ impl SubstepSchedule {
                 shortest = shortest.max((1.0 - from) / MOST_SUBSTEPS as f64);
             }
             steps += 1;
-            let end = path.jump().filter(|at| from < *at).unwrap_or(1.0);
+            let end = path.next_break(from);
             let longest = (next / dt).min(1.0 / self.least as f64);
             let parts = ((end - from) / longest.max(shortest)).ceil().max(1.0);
             let of = Stretch {
@@ -247,7 +270,23 @@ impl SubstepSchedule {
             next = factor * of.length * dt;
             roughness.see(of.length, size);
             if size <= 1.0 || longest <= shortest {
-                limited(n, &mut trial, limits);
+                let mut reached = if parts == 1.0 { end } else { from + of.length };
+                let mut of = of;
+                if let Some((events, watch)) = &mut events {
+                    let mut step = |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| {
+                        self.step(path, of, x, None);
+                    };
+                    let way = (&mut *path, &mut step as &mut StepBy<'_>);
+                    let done = watch.cut(events, way, of, (&state, &mut trial));
+                    if done.length < of.length {
+                        (of, reached) = (done, done.from + done.length);
+                    }
+                    watch.reach(events, path, reached, &mut trial);
+                    if watch.fault().is_some() {
+                        (of.length, reached) = (1.0 - of.from, 1.0);
+                    }
+                }
+                limited(n, &mut trial, centre.limits);
                 for (size, x) in self.sizes.iter_mut().zip(&trial) {
                     *size = if x.is_finite() {
                         size.max(x.abs())
@@ -257,7 +296,7 @@ impl SubstepSchedule {
                 }
                 std::mem::swap(&mut state, &mut trial);
                 stretches.push(of);
-                from = if parts == 1.0 { end } else { from + of.length };
+                from = reached;
             }
         }
         Ok((stretches, next))

@@ -78,7 +78,7 @@ fn carried<const N: usize>(
         tolerance,
         ..Stepping::default()
     };
-    let mut work = Workspace::of(&[], &[Interval::EVERYTHING; N], (rule, stepping));
+    let mut work = Workspace::of(&[], &[Interval::EVERYTHING; N], (rule, stepping), &[]);
     let (mut x, dt) = (start, t / samples as f64);
     for k in 0..samples {
         let now = Now::new(k as f64 * dt, dt, &[], &[]);
@@ -209,7 +209,7 @@ fn points_take_the_steps_of_the_centre() {
     let now = Now::new(0.0, 5.0, &[], &[]);
     let limits = [Interval::EVERYTHING; 2];
     let rule = (Integrator::Adaptive, Stepping::default());
-    let mut work = Workspace::of(&[], &limits, rule);
+    let mut work = Workspace::of(&[], &limits, rule, &[]);
     let at = |work: &mut Workspace, x: f64| {
         let mut points = [2.0, 0.0, x, 0.0];
         work.carry(2, &now, &mut points, rates);
@@ -240,7 +240,7 @@ fn amounts_are_added_at_their_rows() {
         Integrator::RungeKutta4,
     ] {
         let limits = [Interval::EVERYTHING; 2];
-        let mut work = Workspace::of(&holds, &limits, (rule, Stepping::default()));
+        let mut work = Workspace::of(&holds, &limits, (rule, Stepping::default()), &[]);
         let between = Between {
             next: &[0.0, 3.0],
             holds: &holds,

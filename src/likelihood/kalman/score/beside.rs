@@ -43,6 +43,7 @@ impl Kalman<'_> {
         (1..=MOST_STATES).contains(&self.states)
             && self.channels == 1
             && self.settings.method == Method::Points
+            && !self.twin.has_events()
     }
 
     /// Returns whether lanes can hold this filter beside another: of one twin that begins at the first row, with as many rows, the same ones

@@ -1,0 +1,384 @@
+//! Events on the way from one sample to the next: where conditions of one point become true, and what happens there.
+//!
+//! A condition that is false where a stretch begins and true at its end is located on it by repeating the step to a part of the stretch: the
+//! place then is as smooth a function of states and parameters as the step is. The rest of the stretch is done from there.
+
+use super::event::Event;
+use super::path::{Path, Stretch};
+use super::{Integrator, Now};
+
+/// Events of a point between two samples, at most. A ball that comes to rest has infinitely many; twice as many find no more of anything
+/// that is measured, half cuts off what rattles.
+pub(super) const MOST: usize = 200;
+/// Share of a stretch to which the place of an event is found: rounding leaves no less. A hundred times as much shows in differences of
+/// likelihoods.
+const CLOSE: f64 = 1e-14;
+/// Trials of a place: a margin that jumps halves the stretch with every third.
+const TRIES: usize = 150;
+/// Share of the way over which a condition is watched for its direction: far above rounding, far below the motion.
+const PROBE: f64 = 1e-6;
+/// Share of the way within which a time is that of a row.
+const SAME: f64 = 1e-9;
+
+/// A rule that carries points over a stretch.
+pub(super) type StepBy<'s> = dyn FnMut(&mut Path<'_, '_>, Stretch, &mut [f64]) + 's;
+
+/// Call with time and parameters as a twin's own equations see them beside states.
+type InsideOf<'e> = dyn Fn(&Now<'_>, &[f64], &mut dyn FnMut(&Now<'_>)) + 'e;
+
+/// Events of a twin, as they are called.
+pub(crate) struct EventCalls<'e> {
+    pub list: &'e [Event],
+    /// Number of the twin's own states, the first of a point.
+    pub states: usize,
+    pub inside: &'e InsideOf<'e>,
+}
+
+impl EventCalls<'_> {
+    fn margins(&self, now: &Now<'_>, x: &[f64]) -> Vec<f64> {
+        let mut margins = Vec::with_capacity(self.list.len());
+        (self.inside)(now, x, &mut |own| {
+            let all = self.list.iter();
+            margins.extend(all.map(|event| event.margin(own, &x[..self.states])));
+        });
+        margins
+    }
+
+    fn change(&self, event: usize, now: &Now<'_>, x: &mut [f64]) {
+        let seen = x.to_vec();
+        (self.inside)(now, &seen, &mut |own| {
+            self.list[event].change(own, &mut x[..self.states]);
+        });
+    }
+
+    /// Returns the shares of the way at which there are events, each with the event, in order; in discrete time they are at its ends.
+    pub fn times(&self, now: &Now<'_>, x: &[f64], rule: Integrator) -> Vec<(f64, usize)> {
+        let mut all = vec![];
+        (self.inside)(now, x, &mut |own| {
+            for (i, event) in self.list.iter().enumerate() {
+                for at in event.times(own) {
+                    let share = (at - own.t) / now.dt;
+                    // A clock of days has a share of a step in its last digits.
+                    let same = SAME.max(4.0 * f64::EPSILON * own.t.abs() / now.dt);
+                    match share {
+                        _ if share.abs() <= same => all.push((0.0, i)),
+                        _ if share > 0.0 && share < 1.0 - same => match rule {
+                            Integrator::Discrete => all.push((1.0, i)),
+                            _ => all.push((share, i)),
+                        },
+                        _ => {}
+                    }
+                }
+            }
+        });
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all
+    }
+}
+
+/// Events of one way.
+pub(super) struct EventsOfWay<'w> {
+    pub calls: &'w EventCalls<'w>,
+    /// Shares of the way with events at given times.
+    pub times: &'w [(f64, usize)],
+    /// `true` where nothing is between samples.
+    pub is_discrete: bool,
+}
+
+/// A condition along the way of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Condition {
+    False,
+    True,
+    /// Turned true by no motion, but by noise or a measurement: it fires where the motion leads further in.
+    Pending,
+}
+
+/// Conditions along the way of one point.
+#[derive(Debug, Clone)]
+pub(super) struct EventWatch {
+    conditions: Vec<Condition>,
+    /// Events at given times that have been.
+    passed: usize,
+    fired: usize,
+    last: usize,
+}
+
+impl EventWatch {
+    /// From the start of a way, where what noise turned true since the end of the way before may fire; `before` has the conditions there.
+    pub fn begin(
+        events: &EventsOfWay<'_>,
+        path: &mut Path<'_, '_>,
+        before: Option<&[bool]>,
+        x: &mut [f64],
+    ) -> Self {
+        let margins = path.at(0.0, |now| events.calls.margins(now, x));
+        let condition = |(i, margin): (usize, &f64)| match before {
+            _ if !(*margin > 0.0) => Condition::False,
+            Some(before) if !before[i] => Condition::Pending,
+            _ => Condition::True,
+        };
+        let mut watch = Self {
+            conditions: margins.iter().enumerate().map(condition).collect(),
+            passed: 0,
+            fired: 0,
+            last: 0,
+        };
+        watch.fire_pending(events, path, 0.0, x);
+        watch
+    }
+
+    /// Returns which conditions are true, or were.
+    pub fn truths(&self) -> Vec<bool> {
+        let all = self.conditions.iter();
+        all.map(|condition| *condition == Condition::True).collect()
+    }
+
+    /// Returns the event that fired too often.
+    pub fn fault(&self) -> Option<usize> {
+        (self.fired > MOST).then_some(self.last)
+    }
+
+    /// Fires what a jump of the states turned true.
+    pub fn jumped(
+        &mut self,
+        events: &EventsOfWay<'_>,
+        path: &mut Path<'_, '_>,
+        share: f64,
+        x: &mut [f64],
+    ) {
+        let margins = path.at(share, |now| events.calls.margins(now, x));
+        let first = self.turned(&margins);
+        self.keep_false(&margins);
+        if !first.is_empty() {
+            self.fire(events, path, (share, first), x);
+        }
+    }
+
+    /// Fires events at given times up to a share of the way.
+    pub fn reach(
+        &mut self,
+        events: &EventsOfWay<'_>,
+        path: &mut Path<'_, '_>,
+        share: f64,
+        x: &mut [f64],
+    ) {
+        while let Some(&(at, event)) = events.times.get(self.passed) {
+            if at > share + SAME {
+                break;
+            }
+            self.passed += 1;
+            self.fire(events, path, (share, vec![event]), x);
+        }
+    }
+
+    /// Conditions that were false and now are true.
+    fn turned(&self, margins: &[f64]) -> Vec<usize> {
+        let all = self.conditions.iter().zip(margins).enumerate();
+        all.filter(|(_, (condition, margin))| **condition == Condition::False && **margin > 0.0)
+            .map(|(i, _)| i)
+            .collect()
+    }
+
+    fn keep_false(&mut self, margins: &[f64]) {
+        for (condition, margin) in self.conditions.iter_mut().zip(margins) {
+            if !(*margin > 0.0) {
+                *condition = Condition::False;
+            }
+        }
+    }
+
+    /// Changes the states by these events, then by those that the change turns true.
+    fn fire(
+        &mut self,
+        events: &EventsOfWay<'_>,
+        path: &mut Path<'_, '_>,
+        (share, mut waiting): (f64, Vec<usize>),
+        x: &mut [f64],
+    ) {
+        let mut fired = vec![false; self.conditions.len()];
+        let mut next = 0;
+        let mut margins = path.at(share, |now| events.calls.margins(now, x));
+        while next < waiting.len() && self.fault().is_none() {
+            let event = waiting[next];
+            next += 1;
+            (self.last, fired[event]) = (event, true);
+            self.fired += 1;
+            let after = path.at(share, |now| {
+                events.calls.change(event, now, x);
+                events.calls.margins(now, x)
+            });
+            for (i, (before, after)) in margins.iter().zip(&after).enumerate() {
+                if i != event && !(*before > 0.0) && *after > 0.0 {
+                    waiting.push(i);
+                }
+            }
+            margins = after;
+        }
+        for (i, fired) in fired.into_iter().enumerate() {
+            if !(margins[i] > 0.0) || fired && !grows(events, path, (share, i), x) {
+                self.conditions[i] = Condition::False;
+            } else if fired {
+                self.conditions[i] = Condition::True;
+            }
+        }
+    }
+
+    /// Fires pending conditions that the motion leads further into.
+    fn fire_pending(
+        &mut self,
+        events: &EventsOfWay<'_>,
+        path: &mut Path<'_, '_>,
+        share: f64,
+        x: &mut [f64],
+    ) {
+        for i in 0..self.conditions.len() {
+            if self.conditions[i] == Condition::Pending && grows(events, path, (share, i), x) {
+                self.fire(events, path, (share, vec![i]), x);
+            }
+        }
+    }
+
+    /// Cuts a stretch from `from` to `to` at its first event, where `to` then is, changed; returns what is left of the stretch.
+    pub fn cut(
+        &mut self,
+        events: &EventsOfWay<'_>,
+        (path, step): (&mut Path<'_, '_>, &mut StepBy<'_>),
+        of: Stretch,
+        (from, to): (&[f64], &mut [f64]),
+    ) -> Stretch {
+        let end = of.from + of.length;
+        let margins = path.at(end, |now| events.calls.margins(now, to));
+        let turned = self.turned(&margins);
+        let mut first = f64::INFINITY;
+        let mut at_first = vec![];
+        for event in turned {
+            let share = located(events, (path, step), (of, from), (event, margins[event]));
+            if share < first {
+                (first, at_first) = (share, vec![event]);
+            } else if share == first {
+                at_first.push(event);
+            }
+        }
+        if at_first.is_empty() {
+            self.keep_false(&margins);
+            self.fire_pending(events, path, end, to);
+            return of;
+        }
+        let before = Stretch {
+            length: first * of.length,
+            ..of
+        };
+        if first < 1.0 {
+            to.copy_from_slice(from);
+            step(path, before, to);
+        }
+        self.fire(
+            events,
+            path,
+            (before.from + before.length, at_first),
+            to,
+        );
+        before
+    }
+
+    /// Carries a point from `from` through a stretch, of which `to` is the end without events.
+    pub fn settle(
+        &mut self,
+        events: &EventsOfWay<'_>,
+        (path, step): (&mut Path<'_, '_>, &mut StepBy<'_>),
+        of: Stretch,
+        (from, to): (&[f64], &mut [f64]),
+    ) {
+        let end = of.from + of.length;
+        if events.is_discrete {
+            self.jumped(events, path, end, to);
+            return self.reach(events, path, end, to);
+        }
+        let (mut rest, mut start) = (of, vec![]);
+        loop {
+            let from = if start.is_empty() { from } else { &start[..] };
+            let done = self.cut(events, (path, step), rest, (from, to));
+            let left = rest.length - done.length;
+            if left <= CLOSE || self.fault().is_some() {
+                break;
+            }
+            rest = Stretch {
+                from: done.from + done.length,
+                length: left,
+            };
+            start = to.to_vec();
+            step(path, rest, to);
+        }
+        self.reach(events, path, end, to);
+    }
+}
+
+/// Returns whether the motion leads further into a condition, or does not change it.
+fn grows(
+    events: &EventsOfWay<'_>,
+    path: &mut Path<'_, '_>,
+    (share, event): (f64, usize),
+    x: &[f64],
+) -> bool {
+    let of = Stretch {
+        from: share,
+        length: PROBE,
+    };
+    let mut moved = vec![0.0; x.len()];
+    path.rates(of, 0.0, x, &mut moved);
+    let seconds = path.seconds(of);
+    for (moved, x) in moved.iter_mut().zip(x) {
+        *moved = x + seconds * *moved;
+    }
+    let here = path.at(share, |now| events.calls.margins(now, x)[event]);
+    let there = path.at(share + PROBE, |now| {
+        events.calls.margins(now, &moved)[event]
+    });
+    there >= here
+}
+
+/// Returns the share of a stretch at which a condition becomes true, on the side where it is; `margin` is that at the end. Secants by the rule
+/// of Illinois, every third step a half.
+fn located(
+    events: &EventsOfWay<'_>,
+    (path, step): (&mut Path<'_, '_>, &mut StepBy<'_>),
+    (of, from): (Stretch, &[f64]),
+    (event, margin): (usize, f64),
+) -> f64 {
+    let margin_at = |path: &mut Path<'_, '_>, share: f64, x: &[f64]| {
+        path.at(share, |now| events.calls.margins(now, x)[event])
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    let mut ends = [margin_at(path, of.from, from).min(0.0), margin];
+    let mut x = from.to_vec();
+    let mut last_is_true = None;
+    for k in 0..TRIES {
+        if high - low <= CLOSE {
+            break;
+        }
+        let secant = low + (high - low) * ends[0] / (ends[0] - ends[1]);
+        let share = match secant > low && secant < high && k % 3 < 2 {
+            true => secant,
+            false => 0.5 * (low + high),
+        };
+        if share <= low || share >= high {
+            break;
+        }
+        let length = share * of.length;
+        x.copy_from_slice(from);
+        step(path, Stretch { length, ..of }, &mut x);
+        let there = margin_at(path, of.from + length, &x);
+        let is_true = there > 0.0;
+        let again = last_is_true == Some(is_true);
+        match is_true {
+            true => (high, ends[1]) = (share, there),
+            false => (low, ends[0]) = (share, there),
+        }
+        if again {
+            ends[usize::from(!is_true)] *= 0.5;
+        }
+        last_is_true = Some(is_true);
+    }
+    high
+}
