@@ -25,6 +25,24 @@ def test_keywords_are_a_file() -> None:
         assert line in text
 
 
+def test_events_are_tables() -> None:
+    ball = {
+        "parameters": {"e": (0.5, 0.95)},
+        "states": {"h": {"rate": "v", "start": 1.0}, "v": {"rate": "-9.81", "start": 0.0}},
+        "outputs": {"y": {"value": "h", "noise": 0.001}},
+        "events": [{"when": "h < 0", "set": {"h": 0, "v": "-e*v"}}, {"at": [0.25, "1/e"], "add": {"v": 0}}],
+        "step": 0.05,
+        "samples": 20,
+    }
+    twin = truetwin.Twin(**ball)
+    assert '[[event]]\nwhen = "h < 0"\nset = { h = 0.0, v = "-e*v" }' in twin.toml()
+    assert 'at = [0.25, "1/e"]' in twin.toml()
+    heights = twin.simulate({"e": 0.8}, seed=1)["y"]
+    assert min(heights) > -0.005 and max(heights[15:]) > 0.3
+    with pytest.raises(ValueError, match="events and record belong to equations"):
+        truetwin.Twin(lambda parameters, inputs, time: time, parameters={"e": (0, 1)}, outputs="y", step=0.1, events=ball["events"])
+
+
 def test_each_input_may_have_its_plan(tmp_path: Path) -> None:
     (tmp_path / "w.csv").write_text("t,w\n0,1\n0.1,2\n0.2,4\n", encoding="utf-8")
     three = {

@@ -1,6 +1,7 @@
 //! Texts against the equations in Rust that they stand for, and texts that are wrong.
 
 use super::Equations;
+use super::event::BALL;
 use crate::likelihood::kalman::{FilterSettings, Kalman};
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Composed, DigitalTwin, Noise, Now, StateSpace, Twin};
@@ -314,7 +315,7 @@ fn texts_that_are_nearly_right_do_no_harm() {
     let mut accepted = 0;
     for sample in 0..600 {
         let mut source = Noise::new(5, "texts", sample).source("change");
-        let mut text = [TANKS, VAN_DER_POL][sample as usize % 2].to_owned();
+        let mut text = [TANKS, VAN_DER_POL, BALL][sample as usize % 3].to_owned();
         for _ in 0..1 + sample % 3 {
             let mut at = (source.uniform() * text.len() as f64) as usize;
             while !text.is_char_boundary(at) {

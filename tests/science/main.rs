@@ -13,6 +13,7 @@ mod armax;
 mod diagnose;
 mod effects;
 mod estimator;
+mod events;
 mod filter;
 mod fit;
 mod golden;

@@ -154,6 +154,19 @@ def _table(name: str, entries: Mapping[str, Any]) -> str:
     return f"[{name}]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in entries.items()) + "\n"
 
 
+def _event(event: Mapping[str, Any]) -> str:
+    """Return an event as a file has it."""
+    keys: dict[str, Any] = {}
+    for key, value in event.items():
+        if isinstance(value, Mapping):
+            keys[key] = {state: expression(inner) for state, inner in value.items()}
+        elif isinstance(value, Sequence) and not isinstance(value, str):
+            keys[key] = [expression(inner) for inner in value]
+        else:
+            keys[key] = expression(value)
+    return "[[event]]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in keys.items()) + "\n"
+
+
 class Text:
     """A twin as text.
 
@@ -171,6 +184,7 @@ class Text:
         outputs: Mapping[str, Entry],
         constants: Mapping[str, Expression],
         define: Mapping[str, Expression],
+        events: Sequence[Mapping[str, Any]],
         record: Mapping[str, Any],
     ) -> None:
         self.name = name
@@ -185,5 +199,6 @@ class Text:
             + _table("states", tables(states, "rate"))
             + _table("inputs", {key: unit if isinstance(unit, Mapping) else {"unit": unit} for key, unit in inputs.items()})
             + _table("outputs", tables(outputs, "value"))
+            + "".join(_event(event) for event in events)
             + _table("record", record)
         )

@@ -51,6 +51,9 @@ class Twin:
         With ``record={"integrator": "discrete"}``, `drift` returns the states at the next sample.
     constants, define : dict of str to number or expression, optional
         Constants, and names for parts of equations.
+    events : sequence of dict, optional
+        Changes of states where a condition becomes true, or at times: ``{"when": "h < 0", "set": {"h": 0, "v": "-e*v"}}`` or
+        ``{"at": [1.0, 5.5], "add": {"A": "dose"}}``, for equations.
     record : dict, optional
         Further keys of ``[record]``, such as ``{"integrator": "euler"}``, for equations.
     parameters : dict of str to (low, high) or Parameter
@@ -102,6 +105,7 @@ class Twin:
         states: States | None = None,
         constants: Mapping[str, Expression] | None = None,
         define: Mapping[str, Expression] | None = None,
+        events: Sequence[Mapping[str, Any]] = (),
         record: Mapping[str, Any] | None = None,
         step: float | None = None,
         noise: float | Mapping[str, float] | None = None,
@@ -137,17 +141,19 @@ class Twin:
             plan |= record or {}
             moving, shown = _noisy(states, noise, outputs, "rate", drift), _noisy(outputs, noise, outputs, "value", observe)
             if drift or observe:
+                if events:
+                    raise ValueError("events belong to equations as text; give states={name: rate}, and no drift or observe")
                 self._model = PointModel(drift, observe, parameters, moving, inputs, shown, constants or {}, define or {}, plan, name)
                 self.name = self._model.name
                 return
             units = inputs if isinstance(inputs, Mapping) else _units(inputs)
-            self._text = Text(name or "twin", parameters, moving, units, shown, constants or {}, define or {}, plan)
+            self._text = Text(name or "twin", parameters, moving, units, shown, constants or {}, define or {}, events, plan)
             self.name = self._text.name
             return
         if drift or observe:
             raise ValueError("drift and observe are functions of states; give states=[name]")
-        if constants or define or record:
-            raise ValueError("constants, define and record belong to equations; give states={name: rate}")
+        if constants or define or events or record:
+            raise ValueError("constants, define, events and record belong to equations; give states={name: rate}")
         if simulator is None:
             if parameters or outputs or noise is not None or inputs or step is not None:
                 raise ValueError("parameters, inputs, outputs, step and noise describe a callable; give it, or put them into the study file")

@@ -100,6 +100,8 @@ enum Template {
     House,
     /// Hares and lynxes: an oscillation of two states, both measured.
     PredatorPrey,
+    /// A room with a thermostat: events that switch a heater.
+    Thermostat,
 }
 
 impl Template {
@@ -113,6 +115,7 @@ impl Template {
             Self::Pharmacokinetics => include_str!("../../../examples/pharmacokinetics.toml"),
             Self::House => include_str!("../../../examples/house.toml"),
             Self::PredatorPrey => include_str!("../../../examples/predator-prey.toml"),
+            Self::Thermostat => include_str!("../../../examples/thermostat.toml"),
         }
     }
 }

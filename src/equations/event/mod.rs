@@ -1,6 +1,8 @@
 //! Events of a text: when or at which times states are set.
 
 mod margin;
+#[cfg(test)]
+mod tests;
 
 use super::entries::{TableEntry, entry_list};
 use super::error::EquationsError;
@@ -15,6 +17,9 @@ use crate::twin::{Event, Now};
 use margin::margin;
 use smallvec::SmallVec;
 use toml::de::{DeTable, DeValue};
+
+#[cfg(test)]
+pub(in crate::equations) use tests::BALL;
 
 /// List of events in a file.
 pub(super) const EVENT: &str = "event";

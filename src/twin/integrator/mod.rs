@@ -1,6 +1,7 @@
 //! Integrators that carry the equations from one sample to the next.
 
 mod event;
+mod eventful;
 mod pair;
 mod path;
 mod rosenbrock;
@@ -9,14 +10,13 @@ mod schedule;
 mod tests;
 mod watch;
 
-use crate::setting::number;
 use crate::twin::Interval;
+use eventful::EventMemory;
 use path::{Path, Rates, Stretch, jumps};
-use schedule::{Centre, SubstepSchedule, limited};
+use schedule::{SubstepSchedule, limited};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::ops::RangeInclusive;
-use watch::{EventWatch, EventsOfWay};
 
 pub use event::Event;
 pub use schedule::StepsTaken;
@@ -188,9 +188,6 @@ pub enum Integrator {
     Stiff,
 }
 
-/// Share of a step within which two times are one.
-const SAME_TIME: f64 = 1e-6;
-
 /// Buffers of one twin that outlive a step, so that the loop allocates nothing.
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
@@ -201,15 +198,6 @@ pub(crate) struct Workspace {
     /// Substeps to a tolerance, beside `refined`.
     schedule: Option<SubstepSchedule>,
     events: EventMemory,
-}
-
-/// Events up to the last sample.
-#[derive(Debug, Clone, Default)]
-struct EventMemory {
-    /// Time of that sample, and the conditions that were true there at the centre.
-    before: Option<(f64, Vec<bool>)>,
-    /// A sentence about events without end.
-    fault: Option<String>,
 }
 
 /// Buffers of a step.
@@ -314,118 +302,9 @@ impl Workspace {
         }
     }
 
-    /// As [`carry`](Self::carry), of a twin with events: each point has them at its own places.
-    pub(super) fn carry_with_events(
-        &mut self,
-        calls: &EventCalls<'_>,
-        n: usize,
-        now: &Now<'_>,
-        x: &mut [f64],
-        mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
-    ) {
-        let (rule, stages) = (self.integrator, &mut self.stages);
-        let Some(refined) = &mut self.refined else {
-            return;
-        };
-        let is_discrete = rule == Integrator::Discrete;
-        // In discrete time an amount is told with the step.
-        let way = Now {
-            between: now.between.filter(|_| !is_discrete),
-            ..*now
-        };
-        let times = calls.times(&way, &x[..n], rule);
-        let events = EventsOfWay {
-            calls,
-            times: &times,
-            is_discrete,
-        };
-        let mut breaks: Vec<f64> = (times.iter().map(|(share, _)| *share))
-            .chain(jumps(&way).iter().copied())
-            .filter(|share| *share > 0.0 && *share < 1.0)
-            .collect();
-        breaks.sort_by(f64::total_cmp);
-        breaks.dedup();
-        let mut path = Path {
-            now: &way,
-            inputs: &mut refined.inputs,
-            drift: &mut drift,
-            breaks: &breaks,
-        };
-        let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
-        let centre = Centre {
-            x: &x[..n],
-            limits: &refined.limits,
-            events: Some((&events, &watches[0])),
-        };
-        let stretches = match &mut self.schedule {
-            Some(schedule) => schedule.chosen(&mut path, centre),
-            None => path.equal(refined.substeps),
-        };
-        let mut step = |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| match &mut self.schedule
-        {
-            Some(schedule) => schedule.step(path, of, x, None),
-            None => rule.step_over(path, of, x, stages),
-        };
-        let mut before = vec![0.0; x.len()];
-        for of in stretches {
-            before.copy_from_slice(x);
-            step(&mut path, of, x);
-            let points = before.chunks_exact(n).zip(x.chunks_exact_mut(n));
-            for (watch, (from, to)) in watches.iter_mut().zip(points) {
-                watch.settle(&events, (&mut path, &mut step), of, (from, to));
-            }
-            limited(n, x, &refined.limits);
-        }
-        self.events.end(&events, &way, &watches);
-        if self.events.fault.is_some() {
-            x.fill(f64::NAN);
-        }
-    }
-
     /// A buffer for `states` states.
     pub(super) fn stage(&mut self, states: usize) -> &mut [f64] {
         grown(&mut self.stages.stage, states)
-    }
-}
-
-impl EventMemory {
-    /// Conditions of points at the start of a way: what turned true since the end of the way before fires, then doses and events at this
-    /// time.
-    fn begin<'x>(
-        &self,
-        events: &EventsOfWay<'_>,
-        path: &mut Path<'_, '_>,
-        points: impl Iterator<Item = &'x mut [f64]>,
-    ) -> Vec<EventWatch> {
-        let now = path.now;
-        let before = self.before.as_ref().and_then(|(t, truths)| {
-            ((t - now.t).abs() <= SAME_TIME * now.dt).then_some(&truths[..])
-        });
-        let begin = |x: &mut [f64]| {
-            let mut watch = EventWatch::begin(events, path, before, x);
-            if let Some(between) = now.between {
-                between.jump(now, x, path.inputs, path.drift);
-                watch.jumped(events, path, 0.0, x);
-            }
-            watch.reach(events, path, 0.0, x);
-            watch
-        };
-        points.map(begin).collect()
-    }
-
-    /// Keeps the conditions of the centre at the end of a way.
-    fn end(&mut self, events: &EventsOfWay<'_>, way: &Now<'_>, watches: &[EventWatch]) {
-        let end = way.t + way.dt;
-        self.before = Some((end, watches[0].truths()));
-        if let Some(event) = watches.iter().find_map(EventWatch::fault) {
-            self.fault = Some(format!(
-                "{} fired more than {} times between t = {} s and {} s; give it a condition or a change that ends, such as a least speed",
-                events.calls.list[event].name(),
-                watch::MOST,
-                number(way.t),
-                number(end)
-            ));
-        }
     }
 }
 

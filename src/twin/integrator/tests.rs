@@ -51,6 +51,7 @@ fn convergence_orders() {
                 now: &now,
                 inputs: &mut [],
                 drift: &mut pendulum,
+                breaks: &[],
             };
             match is_implicit {
                 true => implicit.step(&mut path, of, (&[1.0, 1.0], &mut x), None),

@@ -90,7 +90,7 @@ pub(super) struct EventsOfWay<'w> {
 enum Condition {
     False,
     True,
-    /// Turned true by no motion, but by noise or a measurement: it fires where the motion leads further in.
+    /// True, and not by motion, but by noise or a measurement, or just behind its event by rounding: it fires where the motion leads further in.
     Pending,
 }
 
@@ -124,7 +124,9 @@ impl EventWatch {
             fired: 0,
             last: 0,
         };
-        watch.fire_pending(events, path, 0.0, x);
+        if watch.conditions.contains(&Condition::Pending) {
+            watch.jumped(events, path, 0.0, x);
+        }
         watch
     }
 
@@ -148,7 +150,7 @@ impl EventWatch {
         x: &mut [f64],
     ) {
         let margins = path.at(share, |now| events.calls.margins(now, x));
-        let first = self.turned(&margins);
+        let first = self.turned(events, path, (share, &margins), x);
         self.keep_false(&margins);
         if !first.is_empty() {
             self.fire(events, path, (share, first), x);
@@ -172,12 +174,21 @@ impl EventWatch {
         }
     }
 
-    /// Conditions that were false and now are true.
-    fn turned(&self, margins: &[f64]) -> Vec<usize> {
-        let all = self.conditions.iter().zip(margins).enumerate();
-        all.filter(|(_, (condition, margin))| **condition == Condition::False && **margin > 0.0)
-            .map(|(i, _)| i)
-            .collect()
+    /// Returns conditions that were false and now are true, and pending ones that the motion leads further into.
+    fn turned(
+        &self,
+        events: &EventsOfWay<'_>,
+        path: &mut Path<'_, '_>,
+        (share, margins): (f64, &[f64]),
+        x: &[f64],
+    ) -> Vec<usize> {
+        let has_turned = |i: &usize| match self.conditions[*i] {
+            _ if !(margins[*i] > 0.0) => false,
+            Condition::False => true,
+            Condition::True => false,
+            Condition::Pending => grows(events, path, (share, *i), x),
+        };
+        (0..margins.len()).filter(has_turned).collect()
     }
 
     fn keep_false(&mut self, margins: &[f64]) {
@@ -216,25 +227,13 @@ impl EventWatch {
             margins = after;
         }
         for (i, fired) in fired.into_iter().enumerate() {
-            if !(margins[i] > 0.0) || fired && !grows(events, path, (share, i), x) {
+            if !(margins[i] > 0.0) {
                 self.conditions[i] = Condition::False;
             } else if fired {
-                self.conditions[i] = Condition::True;
-            }
-        }
-    }
-
-    /// Fires pending conditions that the motion leads further into.
-    fn fire_pending(
-        &mut self,
-        events: &EventsOfWay<'_>,
-        path: &mut Path<'_, '_>,
-        share: f64,
-        x: &mut [f64],
-    ) {
-        for i in 0..self.conditions.len() {
-            if self.conditions[i] == Condition::Pending && grows(events, path, (share, i), x) {
-                self.fire(events, path, (share, vec![i]), x);
+                self.conditions[i] = match grows(events, path, (share, i), x) {
+                    true => Condition::True,
+                    false => Condition::Pending,
+                };
             }
         }
     }
@@ -249,11 +248,13 @@ impl EventWatch {
     ) -> Stretch {
         let end = of.from + of.length;
         let margins = path.at(end, |now| events.calls.margins(now, to));
-        let turned = self.turned(&margins);
+        let turned = self.turned(events, path, (end, &margins), to);
         let mut first = f64::INFINITY;
         let mut at_first = vec![];
         for event in turned {
-            let share = located(events, (path, step), (of, from), (event, margins[event]));
+            let is_pending = self.conditions[event] == Condition::Pending;
+            let margin = (event, margins[event], is_pending);
+            let share = located(events, (path, step), (of, from), margin);
             if share < first {
                 (first, at_first) = (share, vec![event]);
             } else if share == first {
@@ -262,7 +263,6 @@ impl EventWatch {
         }
         if at_first.is_empty() {
             self.keep_false(&margins);
-            self.fire_pending(events, path, end, to);
             return of;
         }
         let before = Stretch {
@@ -273,12 +273,7 @@ impl EventWatch {
             to.copy_from_slice(from);
             step(path, before, to);
         }
-        self.fire(
-            events,
-            path,
-            (before.from + before.length, at_first),
-            to,
-        );
+        self.fire(events, path, (before.from + before.length, at_first), to);
         before
     }
 
@@ -338,16 +333,18 @@ fn grows(
     there >= here
 }
 
-/// Returns the share of a stretch at which a condition becomes true, on the side where it is; `margin` is that at the end. Secants by the rule
-/// of Illinois, every third step a half.
+/// Returns the share of a stretch at which a condition becomes true, on the side where it is, a pending one also where it begins to grow; `margin`
+/// is that at the end. Secants by the rule of Illinois, every third step a half.
 fn located(
     events: &EventsOfWay<'_>,
     (path, step): (&mut Path<'_, '_>, &mut StepBy<'_>),
     (of, from): (Stretch, &[f64]),
-    (event, margin): (usize, f64),
+    (event, margin, is_pending): (usize, f64, bool),
 ) -> f64 {
     let margin_at = |path: &mut Path<'_, '_>, share: f64, x: &[f64]| {
-        path.at(share, |now| events.calls.margins(now, x)[event])
+        let margin = path.at(share, |now| events.calls.margins(now, x)[event]);
+        let leaves = is_pending && margin > 0.0 && !grows(events, path, (share, event), x);
+        if leaves { -margin } else { margin }
     };
     let (mut low, mut high) = (0.0, 1.0);
     let mut ends = [margin_at(path, of.from, from).min(0.0), margin];

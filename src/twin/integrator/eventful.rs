@@ -1,0 +1,130 @@
+//! The way to the next sample of a twin with events.
+
+use super::path::{Path, Stretch, jumps};
+use super::schedule::{Centre, limited};
+use super::watch::{EventCalls, EventWatch, EventsOfWay, MOST};
+use super::{Integrator, Now, Workspace};
+use crate::setting::number;
+
+/// Share of a step within which two times are one.
+const SAME_TIME: f64 = 1e-6;
+
+/// Events up to the last sample.
+#[derive(Debug, Clone, Default)]
+pub(super) struct EventMemory {
+    /// Time of that sample, and the conditions that were true there at the centre.
+    before: Option<(f64, Vec<bool>)>,
+    /// A sentence about events without end.
+    pub fault: Option<String>,
+}
+
+impl Workspace {
+    /// As [`carry`](Self::carry), of a twin with events: each point has them at its own places.
+    pub(in crate::twin) fn carry_with_events(
+        &mut self,
+        calls: &EventCalls<'_>,
+        n: usize,
+        now: &Now<'_>,
+        x: &mut [f64],
+        mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
+    ) {
+        let (rule, stages) = (self.integrator, &mut self.stages);
+        let Some(refined) = self.refined.as_mut().filter(|_| n > 0) else {
+            return;
+        };
+        let is_discrete = rule == Integrator::Discrete;
+        // In discrete time an amount is told with the step.
+        let way = Now {
+            between: now.between.filter(|_| !is_discrete),
+            ..*now
+        };
+        let times = calls.times(&way, &x[..n], rule);
+        let events = EventsOfWay {
+            calls,
+            times: &times,
+            is_discrete,
+        };
+        let mut breaks: Vec<f64> = (times.iter().map(|(share, _)| *share))
+            .chain(jumps(&way).iter().copied())
+            .filter(|share| *share > 0.0 && *share < 1.0)
+            .collect();
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup();
+        let mut path = Path {
+            now: &way,
+            inputs: &mut refined.inputs,
+            drift: &mut drift,
+            breaks: &breaks,
+        };
+        let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
+        let centre = Centre {
+            x: &x[..n],
+            limits: &refined.limits,
+            events: Some((&events, &watches[0])),
+        };
+        let stretches = match &mut self.schedule {
+            Some(schedule) => schedule.chosen(&mut path, centre),
+            None => path.equal(refined.substeps),
+        };
+        let mut step =
+            |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| match &mut self.schedule {
+                Some(schedule) => schedule.step(path, of, x, None),
+                None => rule.step_over(path, of, x, stages),
+            };
+        let mut before = vec![0.0; x.len()];
+        for of in stretches {
+            before.copy_from_slice(x);
+            step(&mut path, of, x);
+            let points = before.chunks_exact(n).zip(x.chunks_exact_mut(n));
+            for (watch, (from, to)) in watches.iter_mut().zip(points) {
+                watch.settle(&events, (&mut path, &mut step), of, (from, to));
+            }
+            limited(n, x, &refined.limits);
+        }
+        self.events.end(&events, &way, &watches);
+        if self.events.fault.is_some() {
+            x.fill(f64::NAN);
+        }
+    }
+}
+
+impl EventMemory {
+    /// Conditions of points at the start of a way: what turned true since the end of the way before fires, then doses and events at this
+    /// time.
+    fn begin<'x>(
+        &self,
+        events: &EventsOfWay<'_>,
+        path: &mut Path<'_, '_>,
+        points: impl Iterator<Item = &'x mut [f64]>,
+    ) -> Vec<EventWatch> {
+        let now = path.now;
+        let before = self.before.as_ref().and_then(|(t, truths)| {
+            ((t - now.t).abs() <= SAME_TIME * now.dt).then_some(&truths[..])
+        });
+        let begin = |x: &mut [f64]| {
+            let mut watch = EventWatch::begin(events, path, before, x);
+            if let Some(between) = now.between {
+                between.jump(now, x, path.inputs, path.drift);
+                watch.jumped(events, path, 0.0, x);
+            }
+            watch.reach(events, path, 0.0, x);
+            watch
+        };
+        points.map(begin).collect()
+    }
+
+    /// Keeps the conditions of the centre at the end of a way.
+    fn end(&mut self, events: &EventsOfWay<'_>, way: &Now<'_>, watches: &[EventWatch]) {
+        let end = way.t + way.dt;
+        self.before = Some((end, watches[0].truths()));
+        if let Some(event) = watches.iter().find_map(EventWatch::fault) {
+            self.fault = Some(format!(
+                "{} fired more than {} times between t = {} s and {} s; give it a condition or a change that ends, such as a least speed",
+                events.calls.list[event].name(),
+                MOST,
+                number(way.t),
+                number(end)
+            ));
+        }
+    }
+}
