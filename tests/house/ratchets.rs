@@ -276,13 +276,13 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     let files = sources.sources.values();
     let files = files.map(|source| source.file.display().to_string());
     vec![
-        Ratchet::new("public items", 162, items.collect()),
+        Ratchet::new("public items", 163, items.collect()),
         Ratchet::new("error types", 14, errors),
         Ratchet::new("lines of code", 58_200, lines),
-        Ratchet::new("files", 470, files.collect()),
+        Ratchet::new("files", 476, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 483, constants(sources)),
+        Ratchet::new("named numeric constants", 491, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             3,

@@ -59,30 +59,35 @@ fn the_restitution_of_a_ball_is_fitted() {
     }
 }
 
-/// A tank that fills, and is emptied to a tenth at a threshold.
+/// A tank that fills, and whose valve opens at a threshold and closes at 0.6 m.
 #[test]
 fn the_threshold_of_a_tank_is_fitted() {
     let (top, k, dt) = (3.0, 0.05, 0.5);
-    // h → 0.3/k − (0.3/k − h₀)·e^{−kt}
+    // Both ways h → q + (h₀ − q)·e^{−at}, with q = 0.3/a.
     let mut exact = vec![];
-    let (mut h0, mut since): (f64, f64) = (0.5, 0.0);
+    let (mut h0, mut since, mut is_open) = (0.5, 0.0, false);
     for row in 0..160 {
-        let full = 0.3 / k;
-        let fills = ((full - h0) / (full - top)).ln() / k;
-        let mut t = f64::from(row) * dt - since;
-        if t > fills {
-            (since, t) = (since + fills, t - fills);
-            h0 = 0.1 * top;
-        }
-        exact.push(full - (full - h0) * (-k * t).exp());
+        let t = f64::from(row) * dt;
+        exact.push(loop {
+            let (a, end): (f64, f64) = match is_open {
+                true => (k + 0.7, 0.6),
+                false => (k, top),
+            };
+            let q = 0.3 / a;
+            let way = ((h0 - q) / (end - q)).ln() / a;
+            if t - since <= way {
+                break q + (h0 - q) * (-a * (t - since)).exp();
+            }
+            (since, h0, is_open) = (since + way, end, !is_open);
+        });
     }
-    for (seed, process) in [(1, "none"), (2, "fitted"), (3, "fitted")] {
-        let text = format!(
-            "[parameters]\ntop = {{ prior = [2.0, 4.0], bounds = [0.5, 8.0] }}\nk = {{ prior = [0.01, 0.1], bounds = [0.0, 0.5] }}\n\
-             [states]\nh = {{ rate = \"0.3 - k*h\", start = 0.5 }}\n[outputs]\ny = {{ value = \"h\", noise = 0.05 }}\n\
-             [[event]]\nwhen = \"h > top\"\nset = {{ h = \"0.1*h\" }}\n[noise]\nprocess = \"{process}\"\n"
-        );
-        let fit = fitted(&text, (dt, 0.05), seed, &exact);
+    for seed in 1..4 {
+        let text = "[parameters]\ntop = { prior = [2.0, 4.0], bounds = [0.8, 5.0] }\nk = { prior = [0.01, 0.1], bounds = [0.001, 0.5] }\n\
+             [states]\nh = { rate = \"0.3 - (k + 0.7*open)*h\", start = 0.5 }\nopen = { rate = \"0\", start = 0 }\n\
+             [outputs]\ny = { value = \"h\", noise = 0.05 }\n\
+             [[event]]\nwhen = \"h > top\"\nset = { open = 1 }\n[[event]]\nwhen = \"h < 0.6\"\nset = { open = 0 }\n\
+             [noise]\nprocess = \"none\"\n";
+        let fit = fitted(text, (dt, 0.05), seed, &exact);
         holds(&fit, "top", top, 0.2);
         holds(&fit, "k", k, 0.01);
     }

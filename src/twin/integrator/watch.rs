@@ -87,7 +87,7 @@ pub(super) struct EventsOfWay<'w> {
 
 /// A condition along the way of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Condition {
+enum Truth {
     False,
     True,
     /// True, and not by motion, but by noise or a measurement, or just behind its event by rounding: it fires where the motion leads further in.
@@ -97,7 +97,7 @@ enum Condition {
 /// Conditions along the way of one point.
 #[derive(Debug, Clone)]
 pub(super) struct EventWatch {
-    conditions: Vec<Condition>,
+    conditions: Vec<Truth>,
     /// Events at given times that have been.
     passed: usize,
     fired: usize,
@@ -114,9 +114,9 @@ impl EventWatch {
     ) -> Self {
         let margins = path.at(0.0, |now| events.calls.margins(now, x));
         let condition = |(i, margin): (usize, &f64)| match before {
-            _ if !(*margin > 0.0) => Condition::False,
-            Some(before) if !before[i] => Condition::Pending,
-            _ => Condition::True,
+            _ if !(*margin > 0.0) => Truth::False,
+            Some(before) if !before[i] => Truth::Pending,
+            _ => Truth::True,
         };
         let mut watch = Self {
             conditions: margins.iter().enumerate().map(condition).collect(),
@@ -124,7 +124,7 @@ impl EventWatch {
             fired: 0,
             last: 0,
         };
-        if watch.conditions.contains(&Condition::Pending) {
+        if watch.conditions.contains(&Truth::Pending) {
             watch.jumped(events, path, 0.0, x);
         }
         watch
@@ -133,7 +133,7 @@ impl EventWatch {
     /// Returns which conditions are true, or were.
     pub fn truths(&self) -> Vec<bool> {
         let all = self.conditions.iter();
-        all.map(|condition| *condition == Condition::True).collect()
+        all.map(|condition| *condition == Truth::True).collect()
     }
 
     /// Returns the event that fired too often.
@@ -184,9 +184,9 @@ impl EventWatch {
     ) -> Vec<usize> {
         let has_turned = |i: &usize| match self.conditions[*i] {
             _ if !(margins[*i] > 0.0) => false,
-            Condition::False => true,
-            Condition::True => false,
-            Condition::Pending => grows(events, path, (share, *i), x),
+            Truth::False => true,
+            Truth::True => false,
+            Truth::Pending => grows(events, path, (share, *i), x),
         };
         (0..margins.len()).filter(has_turned).collect()
     }
@@ -194,7 +194,7 @@ impl EventWatch {
     fn keep_false(&mut self, margins: &[f64]) {
         for (condition, margin) in self.conditions.iter_mut().zip(margins) {
             if !(*margin > 0.0) {
-                *condition = Condition::False;
+                *condition = Truth::False;
             }
         }
     }
@@ -228,11 +228,11 @@ impl EventWatch {
         }
         for (i, fired) in fired.into_iter().enumerate() {
             if !(margins[i] > 0.0) {
-                self.conditions[i] = Condition::False;
+                self.conditions[i] = Truth::False;
             } else if fired {
                 self.conditions[i] = match grows(events, path, (share, i), x) {
-                    true => Condition::True,
-                    false => Condition::Pending,
+                    true => Truth::True,
+                    false => Truth::Pending,
                 };
             }
         }
@@ -252,7 +252,7 @@ impl EventWatch {
         let mut first = f64::INFINITY;
         let mut at_first = vec![];
         for event in turned {
-            let is_pending = self.conditions[event] == Condition::Pending;
+            let is_pending = self.conditions[event] == Truth::Pending;
             let margin = (event, margins[event], is_pending);
             let share = located(events, (path, step), (of, from), margin);
             if share < first {

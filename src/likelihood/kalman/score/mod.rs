@@ -141,10 +141,18 @@ impl Score {
         for j in coordinates.free() {
             let (moved, distance) = coordinates.beside(&phi, j, FORWARD);
             let (_, there) = rows(&coordinates.theta(&moved))?;
+            // Times of events are told so sharply that half a step counts: the other side takes it away.
+            let (back, behind) = coordinates.beside(&phi, j, -FORWARD);
+            let is_central =
+                kalman.twin.has_events() && distance > 0.0 && back[j] >= coordinates.lower()[j];
+            let (other, way) = match is_central {
+                true => (&rows(&coordinates.theta(&back))?.1, distance - behind),
+                false => (&centre, distance),
+            };
             jacobian
                 .column_mut(j)
-                .zip_zip_apply(&there, &centre, |d, there, here| {
-                    *d = (there - here) / distance;
+                .zip_zip_apply(&there, other, |d, there, other| {
+                    *d = (there - other) / way;
                 });
         }
         Self::assemble(kalman, log_likelihood, &centre, &jacobian)
