@@ -87,7 +87,7 @@ pub(super) struct EventsOfWay<'w> {
 
 /// A condition along the way of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Truth {
+enum WatchState {
     False,
     True,
     /// True, and not by motion, but by noise or a measurement, or just behind its event by rounding: it fires where the motion leads further in.
@@ -97,7 +97,7 @@ enum Truth {
 /// Conditions along the way of one point.
 #[derive(Debug, Clone)]
 pub(super) struct EventWatch {
-    conditions: Vec<Truth>,
+    conditions: Vec<WatchState>,
     /// Events at given times that have been.
     passed: usize,
     fired: usize,
@@ -114,9 +114,9 @@ impl EventWatch {
     ) -> Self {
         let margins = path.at(0.0, |now| events.calls.margins(now, x));
         let condition = |(i, margin): (usize, &f64)| match before {
-            _ if !(*margin > 0.0) => Truth::False,
-            Some(before) if !before[i] => Truth::Pending,
-            _ => Truth::True,
+            _ if !(*margin > 0.0) => WatchState::False,
+            Some(before) if !before[i] => WatchState::Pending,
+            _ => WatchState::True,
         };
         let mut watch = Self {
             conditions: margins.iter().enumerate().map(condition).collect(),
@@ -124,7 +124,7 @@ impl EventWatch {
             fired: 0,
             last: 0,
         };
-        if watch.conditions.contains(&Truth::Pending) {
+        if watch.conditions.contains(&WatchState::Pending) {
             watch.jumped(events, path, 0.0, x);
         }
         watch
@@ -133,7 +133,8 @@ impl EventWatch {
     /// Returns which conditions are true, or were.
     pub fn truths(&self) -> Vec<bool> {
         let all = self.conditions.iter();
-        all.map(|condition| *condition == Truth::True).collect()
+        all.map(|condition| *condition == WatchState::True)
+            .collect()
     }
 
     /// Returns the event that fired too often.
@@ -184,9 +185,9 @@ impl EventWatch {
     ) -> Vec<usize> {
         let has_turned = |i: &usize| match self.conditions[*i] {
             _ if !(margins[*i] > 0.0) => false,
-            Truth::False => true,
-            Truth::True => false,
-            Truth::Pending => grows(events, path, (share, *i), x),
+            WatchState::False => true,
+            WatchState::True => false,
+            WatchState::Pending => grows(events, path, (share, *i), x),
         };
         (0..margins.len()).filter(has_turned).collect()
     }
@@ -194,7 +195,7 @@ impl EventWatch {
     fn keep_false(&mut self, margins: &[f64]) {
         for (condition, margin) in self.conditions.iter_mut().zip(margins) {
             if !(*margin > 0.0) {
-                *condition = Truth::False;
+                *condition = WatchState::False;
             }
         }
     }
@@ -228,11 +229,11 @@ impl EventWatch {
         }
         for (i, fired) in fired.into_iter().enumerate() {
             if !(margins[i] > 0.0) {
-                self.conditions[i] = Truth::False;
+                self.conditions[i] = WatchState::False;
             } else if fired {
                 self.conditions[i] = match grows(events, path, (share, i), x) {
-                    true => Truth::True,
-                    false => Truth::Pending,
+                    true => WatchState::True,
+                    false => WatchState::Pending,
                 };
             }
         }
@@ -252,7 +253,7 @@ impl EventWatch {
         let mut first = f64::INFINITY;
         let mut at_first = vec![];
         for event in turned {
-            let is_pending = self.conditions[event] == Truth::Pending;
+            let is_pending = self.conditions[event] == WatchState::Pending;
             let margin = (event, margins[event], is_pending);
             let share = located(events, (path, step), (of, from), margin);
             if share < first {
