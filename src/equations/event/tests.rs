@@ -169,7 +169,7 @@ fn events_without_end_are_an_error() {
         assert!(
             error.costs_one_run()
                 && text.contains(
-                    "event 1 (when h < 0) fired more than 200 times between t = 1.5 s and 2 s;"
+                    "event 1 (when h < 0) fired more than 200 times in the 0.5 s after t = 1.5 s;"
                 ),
             "{rule}: {text}"
         );

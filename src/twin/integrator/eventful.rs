@@ -119,11 +119,11 @@ impl EventMemory {
         self.before = Some((end, watches[0].truths()));
         if let Some(event) = watches.iter().find_map(EventWatch::fault) {
             self.fault = Some(format!(
-                "{} fired more than {} times between t = {} s and {} s; give it a condition or a change that ends, such as a least speed",
+                "{} fired more than {} times in the {} s after t = {} s; give it a condition or a change that ends, such as a least speed",
                 events.calls.list[event].name(),
                 MOST,
-                number(way.t),
-                number(end)
+                number(way.dt),
+                number(way.t)
             ));
         }
     }
