@@ -10,7 +10,8 @@ use crate::twin::points::{
     readout_lanes, readout_one_by_one,
 };
 use crate::twin::{
-    DigitalTwin, Event, EventCalls, Integrator, Noise, Now, ParameterSpace, SimulationError, StateSpace, Workspace,
+    DigitalTwin, Event, EventCalls, Integrator, Noise, Now, ParameterSpace, SimulationError,
+    StateSpace, Workspace,
 };
 use std::sync::Arc;
 
