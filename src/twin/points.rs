@@ -1,7 +1,7 @@
 //! Several states side by side, carried through equations by one call.
 
 use crate::math::{LANES, Lanes};
-use crate::twin::{Interval, Now};
+use crate::twin::{Interval, Now, Workspace};
 
 /// So many numbers are kept on the stack.
 const FEW: usize = 4;
@@ -89,7 +89,7 @@ impl Points<'_> {
 
 /// Value of state j in the point whose state i is shifted.
 #[inline(always)]
-pub(in crate::twin) fn shifted_value(centre: &[f64], (i, shift): (usize, f64), j: usize) -> f64 {
+fn shifted_value(centre: &[f64], (i, shift): (usize, f64), j: usize) -> f64 {
     centre[j] + if j == i { shift } else { 0.0 }
 }
 
@@ -133,6 +133,41 @@ pub(super) fn advance_one_by_one(
         constrain(x);
     }
     bent | changes(centre, constrain)
+}
+
+/// Carries all points as one long state, so that each equation is called once, and steps to a tolerance are those of all points.
+#[inline(always)]
+pub(super) fn advance_together(
+    n: usize,
+    mut points: Points<'_>,
+    work: &mut Workspace,
+    carry: impl FnOnce(&mut [f64], &mut Workspace),
+    constrain: impl FnOnce(&mut [f64]),
+) -> bool {
+    let shifts = &points.shifts[..n];
+    points.limit(n);
+    let (moving, shifted) = points.all.split_at_mut(points.moving * n);
+    carry(moving, work);
+    let pairs = || (shifts.iter().enumerate()).flat_map(|(i, s)| [(i, *s), (i, -s)]);
+    let before = work.stage(n);
+    before.copy_from_slice(&moving[..n]);
+    for (x, of) in shifted.chunks_exact_mut(n).zip(pairs()) {
+        for (j, x) in x.iter_mut().enumerate() {
+            *x = shifted_value(before, of, j);
+        }
+    }
+    constrain(points.all);
+    let (moving, shifted) = points.all.split_at(points.moving * n);
+    let mut bent = false;
+    for (x, before) in moving[..n].iter().zip(&*before) {
+        bent |= x.to_bits() != before.to_bits();
+    }
+    for (x, of) in shifted.chunks_exact(n).zip(pairs()) {
+        for (j, x) in x.iter().enumerate() {
+            bent |= x.to_bits() != shifted_value(before, of, j).to_bits();
+        }
+    }
+    bent
 }
 
 /// Carries the points of several filters, one after the other; returns the lanes in which a constraint acted. The buffers hold points and

@@ -6,8 +6,8 @@ use crate::math::{LANES, Lanes};
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::integrator::felt;
 use crate::twin::points::{
-    Layout, Points, advance_one_by_one, lanes_one_by_one, noise_lanes, observe_lanes,
-    readout_lanes, readout_one_by_one,
+    Layout, Points, advance_one_by_one, advance_together, lanes_one_by_one, noise_lanes,
+    observe_lanes, readout_lanes, readout_one_by_one,
 };
 use crate::twin::{
     DigitalTwin, Event, EventCalls, Integrator, Noise, Now, ParameterSpace, SimulationError,
@@ -106,6 +106,18 @@ impl<T: StateSpace> Engine for T {
     }
 
     fn advance_points(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
+        if work.is_adaptive() {
+            let n = points.shifts.len();
+            let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
+                self.drift_points(now, Layout::dense(n), x, dx);
+            };
+            let carry = |x: &mut [f64], work: &mut Workspace| {
+                self.update_points(now, Layout::dense(n), x);
+                work.carry(n, now, x, drift);
+            };
+            let constrain = |x: &mut [f64]| self.constrain_points(now, Layout::dense(n), x);
+            return advance_together(n, points, work, carry, constrain);
+        }
         // Loops of known length, for the sizes of most twins.
         let advance = |x: &mut [f64]| step(self, now, x, work);
         let constrain = |x: &mut [f64]| self.constrain(now, x);

@@ -4,7 +4,7 @@ use super::parts::Theta;
 use super::{Composed, Entry, Law, TwinPart};
 use crate::math::{LANES, Lanes};
 use crate::twin::points::{
-    Layout, Points, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes, shifted_value,
+    Layout, Points, advance_together, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes,
 };
 use crate::twin::{EventCalls, Now, Workspace};
 
@@ -182,40 +182,19 @@ impl Composed {
         })
     }
 
-    /// Carries all points as one long state, so that each equation is called once.
     #[inline(always)]
     fn advance_together(
         &self,
         n: usize,
         now: &Now<'_>,
-        mut points: Points<'_>,
+        points: Points<'_>,
         work: &mut Workspace,
     ) -> bool {
-        let shifts = &points.shifts[..n];
-        points.limit(n);
-        let (moving, shifted) = points.all.split_at_mut(points.moving * n);
-        self.remember(now, moving);
-        self.carry(n, now, moving, work);
-        let pairs = || (shifts.iter().enumerate()).flat_map(|(i, s)| [(i, *s), (i, -s)]);
-        let before = work.stage(n);
-        before.copy_from_slice(&moving[..n]);
-        for (x, of) in shifted.chunks_exact_mut(n).zip(pairs()) {
-            for (j, x) in x.iter_mut().enumerate() {
-                *x = shifted_value(before, of, j);
-            }
-        }
-        self.bound(now, points.all);
-        let (moving, shifted) = points.all.split_at(points.moving * n);
-        let mut bent = false;
-        for (x, before) in moving[..n].iter().zip(&*before) {
-            bent |= x.to_bits() != before.to_bits();
-        }
-        for (x, of) in shifted.chunks_exact(n).zip(pairs()) {
-            for (j, x) in x.iter().enumerate() {
-                bent |= x.to_bits() != shifted_value(before, of, j).to_bits();
-            }
-        }
-        bent
+        let carry = |x: &mut [f64], work: &mut Workspace| {
+            self.remember(now, x);
+            self.carry(n, now, x, work);
+        };
+        advance_together(n, points, work, carry, |x| self.bound(now, x))
     }
 
     /// As [`advance`](Self::advance), of several filters, one a lane; `one` holds points and shifts of one of them.

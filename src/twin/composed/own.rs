@@ -141,7 +141,7 @@ fn are_together(now: &[Now<'_>]) -> bool {
     })
 }
 
-/// Carries the points of several filters as those of one, whose substeps are those of the first filter.
+/// Carries the points of several filters as those of one, which all take the same substeps.
 fn advance_joined(
     blocks: &dyn Blocks,
     now: &[Now<'_>],
@@ -156,12 +156,7 @@ fn advance_joined(
     for (lane, all) in all.chunks_exact_mut(each).enumerate() {
         gather(moving, lane, all);
     }
-    let whole = all.len();
     work.carry(n, &now[0], &mut all, |stage, x, dx| {
-        if x.len() < whole {
-            // Substeps are chosen at the centre of the first filter.
-            return blocks.drift(stage, n, x, dx);
-        }
         let each_now: Vec<Now<'_>> = (now.iter())
             .map(|now| Now {
                 theta: now.theta,

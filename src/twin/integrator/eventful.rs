@@ -1,7 +1,7 @@
 //! The way to the next sample of a twin with events.
 
 use super::path::{Path, Stretch, jumps};
-use super::schedule::{Centre, limited};
+use super::schedule::{WayRules, limited};
 use super::watch::{EventCalls, EventWatch, EventsOfWay, MOST};
 use super::{Integrator, Now, Workspace};
 use crate::setting::number;
@@ -57,13 +57,12 @@ impl Workspace {
             breaks: &breaks,
         };
         let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
-        let centre = Centre {
-            x: &x[..n],
+        let rules = WayRules {
             limits: &refined.limits,
-            events: Some((&events, &watches[0])),
+            events: Some((&events, watches[0].clone())),
         };
         let stretches = match &mut self.schedule {
-            Some(schedule) => schedule.chosen(&mut path, centre),
+            Some(schedule) => schedule.chosen(&mut path, &mut x[..n].to_vec(), &rules),
             None => path.equal(refined.substeps),
         };
         let mut step =

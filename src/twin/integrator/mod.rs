@@ -182,7 +182,7 @@ pub enum Integrator {
     /// add Δt times themselves.
     Discrete,
     /// Substeps to a [tolerance](Stepping::tolerance), by the pair of orders 5 and 4 of Dormand and Prince; where that takes many, by the
-    /// method of [`Stiff`](Self::Stiff). They are chosen at the centre of a filter's points, which all take the same.
+    /// method of [`Stiff`](Self::Stiff). All points of a filter take the same, chosen so that each keeps the tolerance.
     Adaptive,
     /// Substeps to a tolerance by an L-stable method of order 4 (RODAS of Hairer and Wanner), for rates that differ by orders of magnitude.
     Stiff,
@@ -259,6 +259,12 @@ impl Workspace {
         self.schedule
             .as_ref()
             .is_some_and(SubstepSchedule::is_implicit)
+    }
+
+    /// Returns whether steps are as long as a tolerance allows.
+    #[inline]
+    pub(super) fn is_adaptive(&self) -> bool {
+        self.schedule.is_some()
     }
 
     /// Returns the adaptive substeps so far; `None` for fixed ones.

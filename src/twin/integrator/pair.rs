@@ -42,6 +42,9 @@ const DIFFERENCE: [f64; 7] = [
     22.0 / 525.0,
     -1.0 / 40.0,
 ];
+/// Product of step and rate of decay near that beyond which errors of explicit steps grow (3.3): steps that stability limits are around it,
+/// those that a tolerance limits are far below.
+pub(super) const STABLE: f64 = 2.5;
 /// Order of the error that is estimated.
 pub(super) const ORDER: f64 = 5.0;
 
@@ -50,34 +53,69 @@ pub(super) const ORDER: f64 = 5.0;
 pub(super) struct ExplicitPair {
     slopes: [Vec<f64>; 7],
     stage: Vec<f64>,
+    /// State at which the slope before the last is taken, and the length of the last step times the largest rate that its end shows.
+    sixth: Vec<f64>,
+    reach: f64,
 }
 
 impl ExplicitPair {
-    /// Carries points over a stretch; `error`, of the first point, is the difference between both orders.
+    /// Carries points over a stretch; `errors` are the differences between both orders.
     pub fn step(
         &mut self,
         path: &mut Path<'_, '_>,
         of: Stretch,
         x: &mut [f64],
-        error: Option<&mut [f64]>,
+        errors: Option<&mut [f64]>,
     ) {
         let (h, size) = (path.seconds(of), x.len());
         self.stage.resize(size, 0.0);
-        // The slope at the end serves the error alone.
-        let stages = if error.is_some() { 7 } else { 6 };
+        // The slope at the end serves the errors alone.
+        let stages = if errors.is_some() { 7 } else { 6 };
         for i in 0..stages {
             self.shifted(h, STAGES[i], x);
             self.slopes[i].resize(size, 0.0);
             path.rates(of, NODES[i], &self.stage, &mut self.slopes[i]);
-        }
-        if let Some(error) = error {
-            for (i, error) in error.iter_mut().enumerate() {
-                let parts = DIFFERENCE.iter().zip(&self.slopes);
-                *error = h * parts.map(|(weight, slope)| weight * slope[i]).sum::<f64>();
+            if i == 5 && stages == 7 {
+                self.sixth.clone_from(&self.stage);
             }
+        }
+        if let Some(errors) = errors {
+            errors.fill(0.0);
+            for (weight, slope) in DIFFERENCE.iter().zip(&self.slopes) {
+                for (error, slope) in errors.iter_mut().zip(slope) {
+                    *error += h * weight * slope;
+                }
+            }
+        }
+        if stages == 7 {
+            self.reach =
+                h * distance(&self.slopes[6], &self.slopes[5]) / distance(&self.stage, &self.sixth);
         }
         self.shifted(h, STAGES[6], x);
         x.copy_from_slice(&self.stage);
+    }
+
+    /// Length of the last step with errors, times the largest rate of decay that is seen at its end (Hairer and Wanner, *Solving Ordinary
+    /// Differential Equations II*, section IV.2): around [`STABLE`] where stability limits the step.
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// Carries points over a stretch by the slope at its middle, order 2: where rates jump, the other stages add nothing.
+    pub fn midpoint_step(&mut self, path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]) {
+        let (h, size) = (path.seconds(of), x.len());
+        self.stage.resize(size, 0.0);
+        let [first, middle, ..] = &mut self.slopes;
+        first.resize(size, 0.0);
+        middle.resize(size, 0.0);
+        path.rates(of, 0.0, x, first);
+        for ((stage, x), slope) in self.stage.iter_mut().zip(&*x).zip(&*first) {
+            *stage = x + 0.5 * h * slope;
+        }
+        path.rates(of, 0.5, &self.stage, middle);
+        for (x, slope) in x.iter_mut().zip(&*middle) {
+            *x += h * slope;
+        }
     }
 
     /// Sets the stage to `x` and weighted slopes.
@@ -91,4 +129,10 @@ impl ExplicitPair {
             }
         }
     }
+}
+
+/// Distance of two states.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+    squares.sum::<f64>().sqrt()
 }

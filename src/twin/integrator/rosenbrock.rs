@@ -65,14 +65,14 @@ pub(super) struct Rosenbrock {
 }
 
 impl Rosenbrock {
-    /// Carries points of `n` states each over a stretch; `sizes` are usual sizes of the states. `error`, of the first point, is the
-    /// difference between both orders.
+    /// Carries points of `n` states each over a stretch; `sizes` are usual sizes of the states. `errors` are the
+    /// differences between both orders.
     pub fn step(
         &mut self,
         path: &mut Path<'_, '_>,
         of: Stretch,
         (sizes, x): (&[f64], &mut [f64]),
-        error: Option<&mut [f64]>,
+        errors: Option<&mut [f64]>,
     ) {
         let (h, n) = (path.seconds(of), sizes.len());
         for buffer in (self.increments.iter_mut()).chain(&mut self.rates) {
@@ -109,8 +109,8 @@ impl Rosenbrock {
                 }
             }
         }
-        if let Some(error) = error {
-            error.copy_from_slice(&self.increments[5][..n]);
+        if let Some(errors) = errors {
+            errors.copy_from_slice(&self.increments[5]);
         }
         for ((x, stage), last) in x.iter_mut().zip(&self.stage).zip(&self.increments[5]) {
             *x = stage + last;

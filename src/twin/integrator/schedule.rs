@@ -1,4 +1,4 @@
-//! Substeps to a tolerance: chosen at the centre of a filter's points, taken by all points, so that what is between two samples is one smooth
+//! Substeps to a tolerance: chosen for the points of a filter together and taken by all of them, so that what is between two samples is one smooth
 //! function for all of them, and for all θ of the passes that go side by side.
 
 use super::pair::{self, ExplicitPair};
@@ -17,6 +17,15 @@ const CHANGE: (f64, f64) = (0.2, 5.0);
 /// Explicit steps of one sample from which the implicit method is tried, whose step costs some three of these with few states. Twice as many
 /// find stiffness later; half tries it where rates are fast and not stiff.
 const MANY: usize = 32;
+/// Lengths of two steps that tell rates that jump from those that are stiff, over the length that the tolerance allows: both are beyond it, and
+/// not so far that all detail is lost.
+const JUMPS: [f64; 2] = [2.0, 16.0];
+/// Steps of one sample of several points after which jumps of rates are no longer followed, as each point meets them at its own time; of a
+/// single run [`MANY`], which locate some jumps. Half gives up before a jump that all meet at one time is located, twice as many cost twice.
+const FEW: usize = 8;
+/// Least number of steps of one length in a sample where rates jump again and again, as dry friction does at rest: the time of a jump is known
+/// to a fraction of a step. Twice as many halve that; half of them show beside the noise of a sample.
+const EVEN: usize = 8;
 /// Least factor in the number of steps by which the implicit method wins: what its steps cost more.
 const WORTH: f64 = 4.0;
 
@@ -63,40 +72,55 @@ impl StepsTaken {
     }
 }
 
-/// Errors of steps that fail: where rates jump, they fall in proportion to the length of the step.
+/// Steps of a sample that fail and that do not: where rates jump, several in a row fail each time that a point meets the jump.
 #[derive(Debug, Default)]
-struct Roughness {
-    /// Length and error of the last step, if that failed.
-    failed: Option<(f64, f64)>,
-    /// Failures behind a failure, and how many of them have an error of such an order.
-    repeated: usize,
-    rough: usize,
+struct Falls {
+    kept: usize,
+    /// Kept steps that end where an explicit method is no longer stable.
+    unstable: usize,
+    /// Failures in a row, and rows of two behind the first kept step.
+    row: usize,
+    rows: usize,
 }
 
-impl Roughness {
-    fn see(&mut self, length: f64, error: f64) {
-        let failed = (error > 1.0).then_some((length, error));
-        // Of lengths that are hardly apart, errors say nothing of an order.
-        let before = self.failed.filter(|(longer, _)| *longer > 2.0 * length);
-        if let (Some((longer, larger)), Some(_)) = (before, failed) {
-            self.repeated += 1;
-            let order = (larger / error).ln() / (longer / length).ln();
-            self.rough += usize::from(order < 2.0);
+impl Falls {
+    fn see(&mut self, is_kept: bool, reach: f64) {
+        if is_kept {
+            self.kept += 1;
+            self.unstable += usize::from(reach > pair::STABLE);
+            self.row = 0;
+            return;
         }
-        self.failed = failed;
+        self.row += 1;
+        self.rows += usize::from(self.row == 2 && self.kept > 0);
     }
 
-    fn prevails(&self) -> bool {
-        self.rough > 1 && 2 * self.rough > self.repeated
+    fn repeat(&self) -> bool {
+        self.rows > 1
+    }
+
+    /// Returns whether the steps are short because rates are stiff.
+    fn are_stiff(&self) -> bool {
+        2 * self.unstable > self.kept
     }
 }
 
-/// The point by which steps are chosen, its limits, and its events if there are any.
-#[derive(Clone, Copy)]
-pub(super) struct Centre<'c> {
-    pub x: &'c [f64],
+/// What became of steps to a tolerance.
+enum Outcome {
+    /// They cover the whole way.
+    Done,
+    /// Rates jump again and again.
+    Rough,
+    /// More than allowed are needed; so many cover this share of the way.
+    Many { covered: f64 },
+}
+
+/// What the steps of a way heed beside the tolerance.
+#[derive(Clone)]
+pub(super) struct WayRules<'c> {
     pub limits: &'c [(usize, Interval)],
-    pub events: Option<(&'c EventsOfWay<'c>, &'c EventWatch)>,
+    /// Events, and those of the only point.
+    pub events: Option<(&'c EventsOfWay<'c>, EventWatch)>,
 }
 
 /// Substeps of the way to the next sample.
@@ -113,8 +137,12 @@ pub(super) struct SubstepSchedule {
     stretches: Vec<Stretch>,
     /// Length of the next step, in seconds.
     next: f64,
-    /// Largest size of each state so far.
+    /// Largest size of each state of the centre so far.
     sizes: Vec<f64>,
+    /// `true` where rates jumped in the last sample.
+    was_rough: bool,
+    /// `true` where steps are of one length, and no high order is of use.
+    is_even: bool,
     explicit: ExplicitPair,
     implicit: Rosenbrock,
     taken: StepsTaken,
@@ -137,6 +165,8 @@ impl SubstepSchedule {
             stretches: vec![],
             next: f64::INFINITY,
             sizes: vec![0.0; states],
+            was_rough: false,
+            is_even: false,
             explicit: ExplicitPair::default(),
             implicit: Rosenbrock::default(),
             taken: StepsTaken::default(),
@@ -153,7 +183,8 @@ impl SubstepSchedule {
         self.taken
     }
 
-    /// Carries points, the first of which is the centre, to the next sample; states are put into their limits behind each step.
+    /// Carries points of one filter to the next sample; states are put into their limits behind each step. Points that follow over the same way
+    /// take the steps of the first ones.
     pub fn carry(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], limits: &[(usize, Interval)]) {
         let n = self.sizes.len();
         if n == 0 {
@@ -162,12 +193,11 @@ impl SubstepSchedule {
         let way = (path.now.t, path.now.dt);
         if self.of != Some(way) {
             self.of = Some(way);
-            let centre = Centre {
-                x: &x[..n],
+            let rules = WayRules {
                 limits,
                 events: None,
             };
-            self.choose(path, centre);
+            return self.choose(path, x, &rules);
         }
         for i in 0..self.stretches.len() {
             self.step(path, self.stretches[i], x, None);
@@ -175,82 +205,105 @@ impl SubstepSchedule {
         }
     }
 
-    /// Returns steps chosen anew, at whose ends the events of the centre are.
-    pub fn chosen(&mut self, path: &mut Path<'_, '_>, centre: Centre<'_>) -> Vec<Stretch> {
+    /// Returns steps chosen for one point, which moves with them, at whose ends its events are.
+    pub fn chosen(
+        &mut self,
+        path: &mut Path<'_, '_>,
+        x: &mut [f64],
+        rules: &WayRules<'_>,
+    ) -> Vec<Stretch> {
         self.of = None;
-        self.choose(path, centre);
+        self.choose(path, x, rules);
         self.stretches.clone()
     }
 
-    /// Carries points over a stretch; `error` is that of the first.
+    /// Carries points over a stretch.
     pub fn step(
         &mut self,
         path: &mut Path<'_, '_>,
         of: Stretch,
         x: &mut [f64],
-        error: Option<&mut [f64]>,
+        errors: Option<&mut [f64]>,
     ) {
-        match self.is_implicit {
-            true => self.implicit.step(path, of, (&self.sizes, x), error),
-            false => self.explicit.step(path, of, x, error),
+        match (self.is_implicit, self.is_even) {
+            (true, _) => self.implicit.step(path, of, (&self.sizes, x), errors),
+            (false, true) => self.explicit.midpoint_step(path, of, x),
+            (false, false) => self.explicit.step(path, of, x, errors),
         }
     }
 
-    /// Chooses the substeps of this way, and the method.
-    fn choose(&mut self, path: &mut Path<'_, '_>, centre: Centre<'_>) {
-        let limit = match self.may_change && !self.is_implicit {
+    /// Chooses the method and the substeps of this way, and takes them.
+    fn choose(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], rules: &WayRules<'_>) {
+        let (start, sizes) = (x.to_vec(), self.sizes.clone());
+        self.is_even = false;
+        let most = match self.may_change && !self.is_implicit {
             true => MANY,
             false => usize::MAX,
         };
-        let sizes = self.sizes.clone();
-        let choice = self.tried(path, centre, limit).or_else(|covered| {
+        let mut outcome = self.tried(path, x, rules, most);
+        if let Outcome::Many { covered } = outcome {
             let explicit = MANY as f64 / covered.max(SHORTEST);
             let most = (explicit / WORTH).min(MOST_SUBSTEPS as f64) as usize;
+            x.copy_from_slice(&start);
             self.sizes.clone_from(&sizes);
             self.is_implicit = true;
-            self.tried(path, centre, most).or_else(|_| {
+            outcome = self.tried(path, x, rules, most);
+            if !matches!(outcome, Outcome::Done) {
                 self.is_implicit = false;
+                x.copy_from_slice(&start);
                 self.sizes.clone_from(&sizes);
-                self.tried(path, centre, usize::MAX)
-            })
-        });
-        // Without a limit a choice is always made.
-        let Ok((stretches, next)) = choice else {
-            return;
-        };
+                outcome = self.tried(path, x, rules, usize::MAX);
+            }
+        }
+        self.was_rough = matches!(outcome, Outcome::Rough);
+        if self.was_rough {
+            x.copy_from_slice(&start);
+            self.sizes.clone_from(&sizes);
+            self.take_even_steps(path, x, rules);
+        }
         self.taken.samples += 1;
-        self.taken.substeps += stretches.len();
-        self.taken.most = self.taken.most.max(stretches.len());
+        self.taken.substeps += self.stretches.len();
+        self.taken.most = self.taken.most.max(self.stretches.len());
         self.taken.implicit += usize::from(self.is_implicit);
-        (self.stretches, self.next) = (stretches, next);
     }
 
-    /// Steps over the whole way within the tolerance, and the length of the next; where they are more than `most`, the share of the way that
-    /// so many cover.
+    /// Takes steps within the tolerance, for all points, over the whole way, unless rates jump or more than `most` are needed.
     fn tried(
         &mut self,
         path: &mut Path<'_, '_>,
-        centre: Centre<'_>,
+        x: &mut [f64],
+        rules: &WayRules<'_>,
         most: usize,
-    ) -> Result<(Vec<Stretch>, f64), f64> {
-        let (n, dt) = (centre.x.len(), path.now.dt);
-        let mut events = centre.events.map(|(all, watch)| (all, watch.clone()));
+    ) -> Outcome {
+        let (n, dt) = (self.sizes.len(), path.now.dt);
+        let mut rules = rules.clone();
         let order = match self.is_implicit {
             true => rosenbrock::ORDER,
             false => pair::ORDER,
         };
-        let (mut stretches, mut next, mut state) = (vec![], self.next, centre.x.to_vec());
-        let (mut trial, mut error) = (vec![0.0; n], vec![0.0; n]);
-        let (mut from, mut steps, mut shortest) = (0.0, 0, SHORTEST);
-        let mut roughness = Roughness::default();
+        let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
+        let (mut next, mut from, mut steps, mut shortest) = (self.next, 0.0, 0, SHORTEST);
+        let mut falls = Falls::default();
+        let patience = if x.len() > n { FEW } else { MANY };
+        self.stretches.clear();
+        if self.was_rough && self.jumps(path, x, 0.0, [1.0 / EVEN as f64, 1.0]) {
+            return Outcome::Rough;
+        }
         while from < 1.0 {
-            // What jumps is not smooth at any step: when many were taken, the rest of the way is done in as many.
-            if steps == MANY && roughness.prevails() {
-                shortest = (1.0 - from) / MANY as f64;
-            } else if steps >= most && shortest == SHORTEST {
-                return Err(from);
-            } else if steps == MOST_SUBSTEPS {
-                shortest = shortest.max((1.0 - from) / MOST_SUBSTEPS as f64);
+            if steps >= patience && falls.repeat() {
+                return Outcome::Rough;
+            }
+            if steps > 0 && steps % patience == 0 {
+                let lengths = JUMPS.map(|factor| (factor * next / dt).min(1.0 - from));
+                if self.jumps(path, x, from, lengths) {
+                    return Outcome::Rough;
+                }
+            }
+            if steps >= most && falls.are_stiff() {
+                return Outcome::Many { covered: from };
+            }
+            if steps == MOST_SUBSTEPS {
+                shortest = (1.0 - from) / MOST_SUBSTEPS as f64;
             }
             steps += 1;
             let end = path.next_break(from);
@@ -260,61 +313,116 @@ impl SubstepSchedule {
                 from,
                 length: (end - from) / parts,
             };
-            trial.copy_from_slice(&state);
-            self.step(path, of, &mut trial, Some(&mut error));
-            let size = self.error(&state, &trial, &error);
+            trial.copy_from_slice(x);
+            self.step(path, of, &mut trial, Some(&mut errors));
+            let size = self.largest((x, &trial), &errors);
+            falls.see(size <= 1.0, self.explicit.reach());
             let factor = match size.is_finite() {
                 true => (SAFETY * size.powf(-1.0 / order)).clamp(CHANGE.0, CHANGE.1),
                 false => CHANGE.0,
             };
             next = factor * of.length * dt;
-            roughness.see(of.length, size);
             if size <= 1.0 || longest <= shortest {
-                let mut reached = if parts == 1.0 { end } else { from + of.length };
-                let mut of = of;
-                if let Some((events, watch)) = &mut events {
-                    let mut step = |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| {
-                        self.step(path, of, x, None);
-                    };
-                    let way = (&mut *path, &mut step as &mut StepBy<'_>);
-                    let done = watch.cut(events, way, of, (&state, &mut trial));
-                    if done.length < of.length {
-                        (of, reached) = (done, done.from + done.length);
-                    }
-                    watch.reach(events, path, reached, &mut trial);
-                    if watch.fault().is_some() {
-                        (of.length, reached) = (1.0 - of.from, 1.0);
-                    }
-                }
-                limited(n, &mut trial, centre.limits);
-                for (size, x) in self.sizes.iter_mut().zip(&trial) {
-                    *size = if x.is_finite() {
-                        size.max(x.abs())
-                    } else {
-                        *size
-                    };
-                }
-                std::mem::swap(&mut state, &mut trial);
-                stretches.push(of);
-                from = reached;
+                let reached = if parts == 1.0 { end } else { from + of.length };
+                from = self.keep(path, &mut rules, (of, reached), (x, &mut trial));
             }
         }
-        Ok((stretches, next))
+        self.next = next;
+        Outcome::Done
     }
 
-    /// Largest error of a step over the tolerance of its state.
-    fn error(&self, from: &[f64], to: &[f64], error: &[f64]) -> f64 {
+    /// Returns whether rates jump in steps of these lengths, beyond the tolerance: errors then grow in proportion to the length. Those of smooth rates
+    /// grow with its fifth power, those of stiff rates faster.
+    fn jumps(&mut self, path: &mut Path<'_, '_>, x: &[f64], from: f64, lengths: [f64; 2]) -> bool {
+        let errors = lengths.map(|length| {
+            let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
+            let of = Stretch { from, length };
+            self.explicit.step(path, of, &mut trial, Some(&mut errors));
+            self.largest((x, &trial), &errors)
+        });
+        let order = (errors[1] / errors[0]).ln() / (lengths[1] / lengths[0]).ln();
+        errors[0] > 1.0 && errors[1].is_finite() && order < 2.0
+    }
+
+    /// Keeps a step from `x` to `trial`, up to its first event, and moves `x`; returns the share of the way that is reached.
+    fn keep(
+        &mut self,
+        path: &mut Path<'_, '_>,
+        rules: &mut WayRules<'_>,
+        (mut of, mut reached): (Stretch, f64),
+        (x, trial): (&mut [f64], &mut [f64]),
+    ) -> f64 {
+        let n = self.sizes.len();
+        if let Some((events, watch)) = &mut rules.events {
+            let mut step = |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| {
+                self.step(path, of, x, None);
+            };
+            let way = (&mut *path, &mut step as &mut StepBy<'_>);
+            let done = watch.cut(events, way, of, (x, trial));
+            if done.length < of.length {
+                (of, reached) = (done, done.from + done.length);
+            }
+            watch.reach(events, path, reached, trial);
+            if watch.fault().is_some() {
+                (of.length, reached) = (1.0 - of.from, 1.0);
+            }
+        }
+        x.copy_from_slice(trial);
+        limited(n, x, rules.limits);
+        self.see(&x[..n]);
+        self.stretches.push(of);
+        reached
+    }
+
+    /// Takes steps of one length: what jumps is smooth at none, and a length that follows no point moves no point's result in leaps.
+    fn take_even_steps(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], rules: &WayRules<'_>) {
+        // Where rates are fast besides, as many as the smooth samples before took.
+        let smooth = (path.now.dt / self.next).ceil() as usize;
+        let least = (EVEN * self.least).min(MOST_SUBSTEPS);
+        let longest = 1.0 / smooth.clamp(least, MOST_SUBSTEPS) as f64;
+        let (mut rules, mut trial, mut from) = (rules.clone(), x.to_vec(), 0.0);
+        self.is_even = true;
+        self.stretches.clear();
+        while from < 1.0 {
+            let end = path.next_break(from);
+            let parts = ((end - from) / longest - SHORTEST).ceil().max(1.0);
+            let of = Stretch {
+                from,
+                length: (end - from) / parts,
+            };
+            trial.copy_from_slice(x);
+            self.step(path, of, &mut trial, None);
+            let reached = if parts == 1.0 { end } else { from + of.length };
+            from = self.keep(path, &mut rules, (of, reached), (x, &mut trial));
+        }
+    }
+
+    /// Remembers the largest size of each state of the centre.
+    fn see(&mut self, x: &[f64]) {
+        for (size, x) in self.sizes.iter_mut().zip(x) {
+            if x.is_finite() {
+                *size = size.max(x.abs());
+            }
+        }
+    }
+
+    /// Largest error of a step of any point over the tolerance of its state.
+    fn largest(&self, (from, to): (&[f64], &[f64]), errors: &[f64]) -> f64 {
+        let n = self.sizes.len();
         let mut largest: f64 = 0.0;
-        for (i, error) in error.iter().enumerate() {
-            if *error == 0.0 {
-                continue;
+        let points = from.chunks_exact(n).zip(to.chunks_exact(n));
+        for ((from, to), errors) in points.zip(errors.chunks_exact(n)) {
+            for (i, error) in errors.iter().enumerate() {
+                if *error == 0.0 {
+                    continue;
+                }
+                let size = self.sizes[i].max(from[i].abs()).max(to[i].abs());
+                let share = error.abs() / (self.tolerance * size);
+                if !share.is_finite() {
+                    return f64::INFINITY;
+                }
+                largest = largest.max(share);
             }
-            let size = self.sizes[i].max(from[i].abs()).max(to[i].abs());
-            let share = error.abs() / (self.tolerance * size);
-            if !share.is_finite() {
-                return f64::INFINITY;
-            }
-            largest = largest.max(share);
         }
         largest
     }
