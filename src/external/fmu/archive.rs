@@ -1,6 +1,6 @@
 //! The archive that an FMU is.
 
-use super::description::{ModelDescription, Version};
+use super::description::{Interface, ModelDescription, Version};
 use super::unpack::{MOST_BYTES, unpack};
 use crate::storage::files::with_remedy;
 use crate::storage::untrusted::read;
@@ -57,6 +57,7 @@ impl Archive {
     pub fn new(description: &ModelDescription, folder: TempDir) -> Result<Self, fmi::Error> {
         let ModelDescription {
             version,
+            interface,
             version_text,
             name,
             token,
@@ -67,11 +68,15 @@ impl Archive {
             Version::Two => "guid",
             Version::Three => "instantiationToken",
         };
+        let kind = match interface {
+            Interface::ModelExchange => "ModelExchange",
+            Interface::CoSimulation => "CoSimulation",
+        };
         let [version_text, name, token, identifier] =
             [version_text, name, token, identifier].map(|text| escaped(text));
         let text = format!(
             "<fmiModelDescription fmiVersion=\"{version_text}\" modelName=\"{name}\" {token_name}=\"{token}\">\
-             <CoSimulation modelIdentifier=\"{identifier}\"/><ModelVariables/><ModelStructure/></fmiModelDescription>"
+             <{kind} modelIdentifier=\"{identifier}\"/><ModelVariables/><ModelStructure/></fmiModelDescription>"
         );
         Ok(match version {
             Version::Two => Self::Two(Fmi2Import::new(folder, &text)?),
@@ -80,37 +85,73 @@ impl Archive {
     }
 
     /// A function of the standard that the library lacks, if there is one.
-    pub fn lacks(&self, identifier: &str) -> Result<Option<&'static str>, fmi::Error> {
+    pub fn lacks(
+        &self,
+        identifier: &str,
+        interface: Interface,
+    ) -> Result<Option<&'static str>, fmi::Error> {
         macro_rules! missing {
             ($binding:expr, $($function:ident),*) => {
                 [$((stringify!($function), $binding.$function.is_err())),*].to_vec()
             };
         }
-        let functions = match self {
-            Self::Two(import) => missing!(
-                import.binding(identifier)?,
-                fmi2Instantiate,
-                fmi2FreeInstance,
-                fmi2SetupExperiment,
-                fmi2EnterInitializationMode,
-                fmi2ExitInitializationMode,
-                fmi2Reset,
-                fmi2SetReal,
-                fmi2GetReal,
-                fmi2DoStep
-            ),
-            Self::Three(import) => missing!(
-                import.binding(identifier)?,
-                fmi3InstantiateCoSimulation,
-                fmi3FreeInstance,
-                fmi3EnterInitializationMode,
-                fmi3ExitInitializationMode,
-                fmi3Reset,
-                fmi3SetFloat64,
-                fmi3GetFloat64,
-                fmi3DoStep
-            ),
+        let is_exchange = interface == Interface::ModelExchange;
+        let (mut functions, own) = match self {
+            Self::Two(import) => {
+                let library = import.binding(identifier)?;
+                let all = missing!(
+                    library,
+                    fmi2Instantiate,
+                    fmi2FreeInstance,
+                    fmi2SetupExperiment,
+                    fmi2EnterInitializationMode,
+                    fmi2ExitInitializationMode,
+                    fmi2Reset,
+                    fmi2SetReal,
+                    fmi2GetReal
+                );
+                let exchange = missing!(
+                    library,
+                    fmi2EnterEventMode,
+                    fmi2NewDiscreteStates,
+                    fmi2EnterContinuousTimeMode,
+                    fmi2SetTime,
+                    fmi2SetContinuousStates,
+                    fmi2GetDerivatives,
+                    fmi2GetEventIndicators,
+                    fmi2GetContinuousStates
+                );
+                let step = missing!(library, fmi2DoStep);
+                (all, if is_exchange { exchange } else { step })
+            }
+            Self::Three(import) => {
+                let library = import.binding(identifier)?;
+                let all = missing!(
+                    library,
+                    fmi3FreeInstance,
+                    fmi3EnterInitializationMode,
+                    fmi3ExitInitializationMode,
+                    fmi3Reset,
+                    fmi3SetFloat64,
+                    fmi3GetFloat64
+                );
+                let exchange = missing!(
+                    library,
+                    fmi3InstantiateModelExchange,
+                    fmi3EnterEventMode,
+                    fmi3UpdateDiscreteStates,
+                    fmi3EnterContinuousTimeMode,
+                    fmi3SetTime,
+                    fmi3SetContinuousStates,
+                    fmi3GetContinuousStateDerivatives,
+                    fmi3GetEventIndicators,
+                    fmi3GetContinuousStates
+                );
+                let step = missing!(library, fmi3InstantiateCoSimulation, fmi3DoStep);
+                (all, if is_exchange { exchange } else { step })
+            }
         };
+        functions.extend(own);
         let found = functions.into_iter().find(|(_, missing)| *missing);
         Ok(found.map(|(name, _)| name))
     }

@@ -1,6 +1,7 @@
 //! Model description, of either version of the standard.
 
-use crate::record::Quantity;
+use super::structure;
+use crate::record::{Quantity, Signals};
 use crate::storage::untrusted::message;
 use crate::study::{InputPlan, RecordPlan};
 use crate::twin::{Interval, Parameter};
@@ -23,10 +24,20 @@ pub(super) enum Version {
     Three,
 }
 
+/// What of an FMU is run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Interface {
+    /// Its equations.
+    ModelExchange,
+    /// Its own steps.
+    CoSimulation,
+}
+
 /// Used part of `modelDescription.xml`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ModelDescription {
     pub version: Version,
+    pub interface: Interface,
     /// As written: "2.0", "3.0.1".
     pub version_text: String,
     pub name: String,
@@ -39,6 +50,10 @@ pub(super) struct ModelDescription {
     pub parameters: Vec<FmuVariable>,
     pub inputs: Vec<FmuVariable>,
     pub outputs: Vec<FmuVariable>,
+    /// Continuous states, in the order of the state vector.
+    pub states: Vec<FmuVariable>,
+    /// Number of event indicators.
+    pub indicators: usize,
     pub start: f64,
     pub stop: Option<f64>,
     pub step: Option<f64>,
@@ -49,15 +64,19 @@ pub(super) struct ModelDescription {
 pub(super) struct FmuVariable {
     pub name: String,
     pub unit: String,
+    pub description: String,
     pub reference: u32,
     pub start: f64,
     pub min: Option<f64>,
     pub max: Option<f64>,
 }
 
+/// Declared types by name.
+pub(super) type Types<'a> = BTreeMap<&'a str, Reals>;
+
 /// Attributes of a real variable or of its declared type.
 #[derive(Default, Clone)]
-struct Reals {
+pub(super) struct Reals {
     unit: Option<String>,
     min: Option<f64>,
     max: Option<f64>,
@@ -85,13 +104,70 @@ fn number(node: Node<'_, '_>, name: &str) -> Result<Option<f64>, String> {
     }
 }
 
-fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|c| c.has_tag_name(name))
 }
 
-fn attribute<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
+pub(super) fn attribute<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
     let tag = node.tag_name().name().to_owned();
     (node.attribute(name)).ok_or_else(|| format!("<{tag}> has no attribute {name}"))
+}
+
+/// All variables, in order.
+pub(super) fn variables<'a, 'i>(root: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    let all = child(root, "ModelVariables").into_iter();
+    all.flat_map(|n| n.children()).filter(Node::is_element)
+}
+
+/// Attributes of a real scalar; `None` for other variables.
+pub(super) fn real<'a, 'i>(node: Node<'a, 'i>, version: Version) -> Option<Node<'a, 'i>> {
+    match version {
+        Version::Two => child(node, "Real"),
+        // Arrays have dimensions; they are left at their start.
+        Version::Three => {
+            Some(node).filter(|n| n.has_tag_name("Float64") && child(*n, "Dimension").is_none())
+        }
+    }
+}
+
+fn declared<'a>(root: Node<'a, '_>, version: Version) -> Result<Types<'a>, String> {
+    let mut types = BTreeMap::new();
+    for node in child(root, "TypeDefinitions")
+        .iter()
+        .flat_map(|n| n.children())
+    {
+        let reals = match version {
+            Version::Two => child(node, "Real"),
+            Version::Three => Some(node).filter(|n| n.has_tag_name("Float64Type")),
+        };
+        if let (Some(reals), Some(name)) = (reals, node.attribute("name")) {
+            types.insert(name, Reals::of(reals)?);
+        }
+    }
+    Ok(types)
+}
+
+fn only_once(interface: Node<'_, '_>) -> bool {
+    let once = interface.attribute("canBeInstantiatedOnlyOncePerProcess");
+    once.is_some_and(|text| ["true", "1"].contains(&text))
+}
+
+/// The equations where they can be run: they have states, and each thread may have instances.
+fn chosen<'a, 'i>(
+    root: Node<'a, 'i>,
+    is_stateless: bool,
+) -> Result<(Interface, Node<'a, 'i>), String> {
+    let exchange = child(root, "ModelExchange");
+    let problem = match exchange {
+        Some(_) if is_stateless => "its model exchange has no continuous states",
+        Some(node) if only_once(node) => "its model exchange allows one instance only",
+        Some(node) => return Ok((Interface::ModelExchange, node)),
+        None => "it has neither model exchange nor co-simulation",
+    };
+    match child(root, "CoSimulation") {
+        Some(node) => Ok((Interface::CoSimulation, node)),
+        None => Err(format!("{problem}; export it for co-simulation")),
+    }
 }
 
 impl ModelDescription {
@@ -114,24 +190,24 @@ impl ModelDescription {
                 return Err(format!("FMI {version_text}; 2.0 and 3.0 can be used"));
             }
         };
-        let Some(simulation) = child(root, "CoSimulation") else {
-            return Err(
-                "it has no co-simulation, only model exchange; export it for co-simulation".into(),
-            );
-        };
+        let types = declared(root, version)?;
+        let states = structure::states(root, version, &types)?;
+        let (interface, simulation) = chosen(root, states.is_empty())?;
         let experiment = child(root, "DefaultExperiment");
         let time = |name| experiment.map_or(Ok(None), |node| number(node, name));
-        let once = simulation.attribute("canBeInstantiatedOnlyOncePerProcess");
         let mut found = Self {
             version,
+            interface,
             version_text: version_text.into(),
             name: attribute(root, "modelName")?.into(),
             token: attribute(root, token)?.into(),
             identifier: attribute(simulation, "modelIdentifier")?.into(),
-            alone: once.is_some_and(|text| ["true", "1"].contains(&text)),
+            alone: only_once(simulation),
             parameters: Vec::new(),
             inputs: Vec::new(),
             outputs: Vec::new(),
+            states,
+            indicators: structure::indicators(root, version)?,
             start: time("startTime")?.unwrap_or(0.0),
             stop: time("stopTime")?,
             step: time("stepSize")?,
@@ -143,35 +219,12 @@ impl ModelDescription {
                 found.identifier
             ));
         }
-        found.read_variables(root)?;
+        found.read_variables(root, &types)?;
         Ok(found)
     }
 
-    fn read_variables(&mut self, root: Node<'_, '_>) -> Result<(), String> {
-        let mut types = BTreeMap::new();
-        for node in child(root, "TypeDefinitions")
-            .iter()
-            .flat_map(|n| n.children())
-        {
-            let reals = match self.version {
-                Version::Two => child(node, "Real"),
-                Version::Three => Some(node).filter(|n| n.has_tag_name("Float64Type")),
-            };
-            if let (Some(reals), Some(name)) = (reals, node.attribute("name")) {
-                types.insert(name, Reals::of(reals)?);
-            }
-        }
-        for node in child(root, "ModelVariables")
-            .iter()
-            .flat_map(|n| n.children())
-        {
-            let reals = match self.version {
-                Version::Two => child(node, "Real"),
-                // Arrays have dimensions; they are left at their start.
-                Version::Three => Some(node)
-                    .filter(|n| n.has_tag_name("Float64") && child(*n, "Dimension").is_none()),
-            };
-            let Some(reals) = reals else { continue };
+    fn read_variables(&mut self, root: Node<'_, '_>, types: &Types<'_>) -> Result<(), String> {
+        for node in variables(root) {
             let list = match (node.attribute("causality"), node.attribute("variability")) {
                 (Some("parameter"), Some("constant")) => continue,
                 (Some("parameter"), _) => &mut self.parameters,
@@ -179,20 +232,7 @@ impl ModelDescription {
                 (Some("output"), _) => &mut self.outputs,
                 _ => continue,
             };
-            let own = Reals::of(reals)?;
-            let declared = reals.attribute("declaredType");
-            let general = declared.and_then(|name| types.get(name)).cloned();
-            let general = general.unwrap_or_default();
-            let reference = attribute(node, "valueReference")?;
-            list.push(FmuVariable {
-                name: attribute(node, "name")?.into(),
-                unit: own.unit.or(general.unit).unwrap_or_default(),
-                reference: (reference.parse())
-                    .map_err(|_| format!("valueReference = \"{reference}\" is no number"))?,
-                start: number(reals, "start")?.unwrap_or(0.0),
-                min: own.min.or(general.min),
-                max: own.max.or(general.max),
-            });
+            list.extend(FmuVariable::read(node, self.version, types)?);
         }
         Ok(())
     }
@@ -217,8 +257,8 @@ impl ModelDescription {
         Ok(())
     }
 
-    /// Step, length and, where all inputs have two limits, random levels between these.
-    pub fn plan(&self) -> RecordPlan {
+    /// Step, length and, where all inputs have two limits, random levels between these, by the names of `signals`.
+    pub fn plan(&self, signals: &Signals) -> RecordPlan {
         let span = (self.stop.map(|stop| stop - self.start)).filter(|span| *span > 0.0);
         let step = (self.step.filter(|step| *step > 0.0))
             .or(span.map(|span| span / SAMPLES))
@@ -226,11 +266,12 @@ impl ModelDescription {
         let intervals = span.map_or(SAMPLES, |span| (span / step).round());
         let samples = (intervals as usize).saturating_add(1);
         let hold = (samples / HOLDS).max(1);
-        let levels = |v: &FmuVariable| {
+        let levels = |(v, input): (&FmuVariable, &Quantity)| {
             let levels = Interval::new(v.min?, v.max?).ok()?;
-            Some((v.name.clone(), InputPlan::Levels { levels, hold }))
+            Some((input.name.clone(), InputPlan::Levels { levels, hold }))
         };
-        let plans: Option<Vec<_>> = self.inputs.iter().map(levels).collect();
+        let inputs = self.inputs.iter().zip(&signals.inputs);
+        let plans: Option<Vec<_>> = inputs.map(levels).collect();
         match plans.filter(|plans| !plans.is_empty()) {
             Some(plans) => RecordPlan::by_input(step, samples, plans),
             None => RecordPlan::autonomous(step, samples),
@@ -239,6 +280,32 @@ impl ModelDescription {
 }
 
 impl FmuVariable {
+    /// Reads a variable; `None` of one that is no real scalar.
+    pub fn read(
+        node: Node<'_, '_>,
+        version: Version,
+        types: &Types<'_>,
+    ) -> Result<Option<Self>, String> {
+        let Some(reals) = real(node, version) else {
+            return Ok(None);
+        };
+        let own = Reals::of(reals)?;
+        let declared = reals.attribute("declaredType");
+        let general = declared.and_then(|name| types.get(name)).cloned();
+        let general = general.unwrap_or_default();
+        let reference = attribute(node, "valueReference")?;
+        Ok(Some(Self {
+            name: attribute(node, "name")?.into(),
+            unit: own.unit.or(general.unit).unwrap_or_default(),
+            description: node.attribute("description").unwrap_or_default().into(),
+            reference: (reference.parse())
+                .map_err(|_| format!("valueReference = \"{reference}\" is no number"))?,
+            start: number(reals, "start")?.unwrap_or(0.0),
+            min: own.min.or(general.min),
+            max: own.max.or(general.max),
+        }))
+    }
+
     /// As a quantity.
     pub fn quantity(&self) -> Quantity {
         Quantity::new(&self.name, &self.unit)
@@ -268,102 +335,5 @@ impl FmuVariable {
         };
         let bounds = (min.unwrap_or(far.0), max.unwrap_or(far.1));
         Parameter::new(name, unit, clip(near.0), clip(near.1)).within(bounds.0, bounds.1)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const TWO: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="Mass" guid="{1}" vendorThing="x">
-  <CoSimulation modelIdentifier="mass" canBeInstantiatedOnlyOncePerProcess="true"/>
-  <TypeDefinitions><SimpleType name="Length"><Real unit="m" min="-2" max="2"/></SimpleType></TypeDefinitions>
-  <DefaultExperiment startTime="1" stopTime="4" stepSize="0.1"/>
-  <ModelVariables>
-    <ScalarVariable name="m" valueReference="0" causality="parameter" variability="fixed"><Real start="2" unit="kg" min="0" max="1e60"/></ScalarVariable>
-    <ScalarVariable name="g" valueReference="1" causality="parameter" variability="constant"><Real start="9.81"/></ScalarVariable>
-    <ScalarVariable name="n" valueReference="2" causality="parameter"><Integer start="2"/></ScalarVariable>
-    <ScalarVariable name="u" valueReference="7" causality="input" canHandleMultipleSetPerTimeInstant="true"><Real start="0" declaredType="Length"/></ScalarVariable>
-    <ScalarVariable name="x" valueReference="8" causality="output"><Real declaredType="Length" unit="mm"/></ScalarVariable>
-    <ScalarVariable name="v" valueReference="9"><Real/></ScalarVariable>
-  </ModelVariables>
-</fmiModelDescription>"#;
-
-    #[test]
-    fn the_second_version_is_read() {
-        let found = ModelDescription::parse(TWO).unwrap();
-        assert_eq!((found.version, found.alone), (Version::Two, true));
-        let names = |list: &[FmuVariable]| list.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
-        assert_eq!(names(&found.parameters), ["m"]);
-        assert_eq!(
-            found.parameters[0].parameter(),
-            Parameter::new("m", "kg", 1.0, 3.0).within(0.0, 20.0)
-        );
-        assert_eq!(found.inputs[0].quantity(), Quantity::new("u", "m"));
-        assert_eq!(found.outputs[0].quantity(), Quantity::new("x", "mm"));
-        let plans = [("u", InputPlan::levels(-2.0, 2.0, 2))];
-        assert_eq!(found.plan(), RecordPlan::by_input(0.1, 31, plans));
-    }
-
-    #[test]
-    fn the_third_version_is_read_and_arrays_are_left_alone() {
-        let text = r#"<fmiModelDescription fmiVersion="3.0.1" modelName="M" instantiationToken="t">
-            <CoSimulation modelIdentifier="m"/><ModelVariables>
-            <Float64 name="k" valueReference="1" causality="parameter" unit="N/m" start="-4"/>
-            <Float64 name="c" valueReference="2" causality="parameter" start="0"/>
-            <Float64 name="A" valueReference="3" causality="parameter" start="1 2"><Dimension start="2"/></Float64>
-            <Float64 name="y" valueReference="4" causality="output"/></ModelVariables></fmiModelDescription>"#;
-        let mut found = ModelDescription::parse(text).unwrap();
-        let parameters: Vec<_> = found
-            .parameters
-            .iter()
-            .map(FmuVariable::parameter)
-            .collect();
-        assert_eq!(
-            parameters[0],
-            Parameter::new("k", "N/m", -6.0, -2.0).within(-40.0, -0.4)
-        );
-        assert_eq!(
-            parameters[1],
-            Parameter::new("c", "", -1.0, 1.0).within(-10.0, 10.0)
-        );
-        assert_eq!(parameters.len(), 2);
-        assert_eq!(found.plan(), RecordPlan::autonomous(0.01, 301));
-        found.select(&["c".into()]).unwrap();
-        assert_eq!((found.parameters.len(), found.outputs.len()), (1, 1));
-        let message = found.select(&["k".into()]).unwrap_err();
-        assert!(message.contains("there are c, y"), "{message}");
-    }
-
-    #[test]
-    fn what_cannot_be_used_is_named() {
-        for (from, to, part) in [
-            ("fmiVersion=\"2.0\"", "fmiVersion=\"1.0\"", "FMI 1.0"),
-            (
-                "CoSimulation",
-                "ModelExchange",
-                "export it for co-simulation",
-            ),
-            (
-                "modelIdentifier=\"mass\"",
-                "",
-                "no attribute modelIdentifier",
-            ),
-            (
-                "modelIdentifier=\"mass\"",
-                "modelIdentifier=\"../../mass\"",
-                "is no name of a library",
-            ),
-            (
-                "min=\"0\"",
-                "min=\"none\"",
-                "min = \"none\" of Real is no number",
-            ),
-            ("</fmiModelDescription>", "", "line"),
-        ] {
-            let message = ModelDescription::parse(&TWO.replace(from, to)).unwrap_err();
-            assert!(message.contains(part) || part == "line", "{message}");
-        }
     }
 }

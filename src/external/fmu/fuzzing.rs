@@ -1,6 +1,7 @@
 //! Entries for the fuzz tests that otherwise only a whole FMU reaches. No part of the library's interface.
 
 use super::description::{FmuVariable, ModelDescription};
+use crate::record::Signals;
 
 /// Reads a text as a `modelDescription.xml`.
 pub fn description(text: &str) -> Result<(), String> {
@@ -10,6 +11,10 @@ pub fn description(text: &str) -> Result<(), String> {
         .iter()
         .map(FmuVariable::parameter)
         .collect();
-    let _ = (found.plan(), parameters);
+    let signals = Signals {
+        inputs: found.inputs.iter().map(FmuVariable::quantity).collect(),
+        outputs: Vec::new(),
+    };
+    let _ = (found.plan(&signals), parameters);
     Ok(())
 }

@@ -13,7 +13,10 @@ pub(super) enum Instance {
 }
 
 /// An outcome of the library as a simulation's; `what` is for the message.
-fn done<T>(outcome: Result<T, impl Into<fmi::Error>>, what: &str) -> Result<(), SimulationError> {
+pub(super) fn done<T>(
+    outcome: Result<T, impl Into<fmi::Error>>,
+    what: &str,
+) -> Result<(), SimulationError> {
     let error = match outcome {
         Ok(_) => return Ok(()),
         Err(error) => error.into(),

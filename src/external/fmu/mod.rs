@@ -1,33 +1,37 @@
 //! A twin from an FMU, as Modelica tools, Simulink and many others export them (cargo feature `fmi`).
 //!
-//! FMI 2.0 and 3.0, co-simulation. `docs/external-programs.md` explains how the model description is used.
+//! FMI 2.0 and 3.0, model exchange (equations) and co-simulation (a black box). `docs/external-programs.md` explains how the model description is used.
 
 mod archive;
+mod black_box;
 mod description;
+#[cfg(test)]
+mod description_tests;
+mod exchange;
 pub(crate) mod fuzzing;
 mod instance;
+mod structure;
 mod unpack;
 mod worker;
 
 use super::check_call;
-use super::lending::Lending;
 use super::name;
 use crate::record::{Drive, Signal, Signals};
 use crate::study::{RecordPlan, Study, StudyError};
-use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
+use crate::twin::{Composed, DigitalTwin, Noise, ParameterSpace, SimulationError};
 use archive::{Archive, refused};
-use description::FmuVariable;
-use instance::Instance;
+use black_box::SteppedFmu;
+use description::{FmuVariable, Interface, ModelDescription};
+use exchange::ExchangeTwin;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use worker::{FmuWorker, References};
 
 /// Settings of an FMU.
 ///
 /// | field | default | |
 /// |---|---|---|
 /// | `variables` | all | names of the parameters to estimate, of inputs and outputs; if no variable of a kind is named, all of that kind are used |
-/// | `workers` | one per thread | number of instances that run at once; 1 if the FMU allows no more |
+/// | `workers` | one per thread | number of instances of co-simulation that run at once; 1 if the FMU allows no more |
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FmuSettings {
     /// Names of the real parameters, inputs and outputs of the twin; others keep their start value.
@@ -36,26 +40,31 @@ pub struct FmuSettings {
     pub workers: Option<usize>,
 }
 
-/// An FMU as a black box without noise of its own.
+/// An FMU without noise of its own: its equations, of one for model exchange that has states; a black box, of one for co-simulation alone.
 ///
 /// θ are the real parameters. Prior and bounds are `min` and `max` of the description; where one of them is missing, the prior
 /// is `start` ± 50 % (`[-1, 1]` for 0) and the bounds reach from a tenth of `start` to ten times (`[-10, 10]`), both cut at the
 /// limit that is given. A study file narrows both.
 ///
-/// Row k is read when time k·Δt is reached, before input k is set: an output that depends on an input directly lags it by a
+/// Equations have the continuous states of the description by name, known starts, limits from their `min` and `max`, and the events of the FMU.
+/// Their integrator is [`Adaptive`](crate::twin::Integrator::Adaptive). Each thread has instances of its own.
+///
+/// Of co-simulation, row k is read when time k·Δt is reached, before input k is set: an output that depends on an input directly lags it by a
 /// sample. A step that fails is a divergence at its time; a refused initialisation costs the run. Instances are reset between
 /// runs and have a thread each. The FMU runs in this process: if it crashes or hangs, so does this.
 pub struct FmuTwin {
-    /// Dropped before the unpacked folder is removed.
-    workers: Lending<FmuWorker>,
-    archive: Arc<Archive>,
-    references: References,
-    start: f64,
+    inside: Inside,
     path: PathBuf,
     name: String,
     parameters: ParameterSpace,
     signals: Signals,
     plan: RecordPlan,
+}
+
+/// What is run.
+enum Inside {
+    States(Arc<ExchangeTwin>),
+    Steps(SteppedFmu),
 }
 
 impl std::fmt::Debug for FmuTwin {
@@ -72,7 +81,7 @@ impl FmuTwin {
     ///
     /// # Errors
     ///
-    /// A file that is no FMU for co-simulation, or not for this platform; variables that it does not have.
+    /// A file that is no FMU, or not for this platform; variables that it does not have.
     pub fn open(path: &Path, settings: FmuSettings) -> Result<Self, StudyError> {
         let (mut description, folder) = archive::open(path)?;
         let variables = |problem: String| refused(path, problem);
@@ -93,41 +102,49 @@ impl FmuTwin {
             return Err(variables("no real output; export it with one".into()));
         }
         let failed = |problem: String| {
-            let remedy = "export it with a binary for this platform, for co-simulation";
+            let remedy = "export it with a binary for this platform";
             let problem = format!("the FMU cannot be instantiated: {problem}; {remedy}");
             refused(path, problem)
         };
         let archive = Archive::new(&description, folder).map_err(|e| failed(e.to_string()))?;
-        let lacks = archive.lacks(&description.identifier);
+        let lacks = archive.lacks(&description.identifier, description.interface);
         if let Some(function) = lacks.map_err(|e| failed(e.to_string()))? {
             return Err(failed(format!("its library has no {function}")));
         }
-        let archive = Arc::new(archive);
-        // A test instance; those that simulate live on threads of their own.
-        drop(Instance::new(&archive).map_err(|e| failed(e.to_string()))?);
-        let threads = settings.workers.unwrap_or_else(rayon::current_num_threads);
-        let references = |list: &[FmuVariable]| list.iter().map(|v| v.reference).collect();
+        let inside = match description.interface {
+            Interface::ModelExchange => {
+                let twin = ExchangeTwin::new(&description, archive).map_err(failed)?;
+                Inside::States(Arc::new(twin))
+            }
+            Interface::CoSimulation => {
+                let twin = SteppedFmu::new(&description, archive, settings.workers);
+                Inside::Steps(twin.map_err(|e| failed(e.to_string()))?)
+            }
+        };
+        Ok(Self::of(inside, &description, path))
+    }
+
+    fn of(inside: Inside, description: &ModelDescription, path: &Path) -> Self {
         let quantities = |list: &[FmuVariable]| list.iter().map(FmuVariable::quantity).collect();
-        Ok(Self {
-            workers: Lending::new(if description.alone { 1 } else { threads.max(1) }),
-            archive,
-            references: References {
-                parameters: references(&description.parameters),
-                inputs: references(&description.inputs),
-                outputs: references(&description.outputs),
-            },
-            start: description.start,
+        let (parameters, signals) = match &inside {
+            Inside::States(twin) => (twin.parameters(), twin.signals()),
+            Inside::Steps(_) => {
+                let parameters = description.parameters.iter().map(FmuVariable::parameter);
+                let signals = Signals {
+                    inputs: quantities(&description.inputs),
+                    outputs: quantities(&description.outputs),
+                };
+                (ParameterSpace::new(parameters), signals)
+            }
+        };
+        Self {
+            inside,
             path: path.into(),
             name: name::made_fit(&description.name),
-            parameters: ParameterSpace::new(
-                description.parameters.iter().map(FmuVariable::parameter),
-            ),
-            signals: Signals {
-                inputs: quantities(&description.inputs),
-                outputs: quantities(&description.outputs),
-            },
-            plan: description.plan(),
-        })
+            parameters,
+            plan: description.plan(&signals),
+            signals,
+        }
     }
 
     /// Returns the name of the model.
@@ -165,17 +182,19 @@ impl DigitalTwin for FmuTwin {
         &self,
         theta: &[f64],
         drive: &Drive,
-        _noise: Noise,
+        noise: Noise,
     ) -> Result<Signal, SimulationError> {
         check_call(&self.parameters, &self.signals, theta, drive)?;
-        let (idle, place) = self.workers.take(false, |_| true);
-        let mut worker = idle.unwrap_or_else(|| {
-            FmuWorker::new(self.archive.clone(), self.references.clone(), self.start)
-        });
-        let outcome = worker.simulate(theta, drive);
-        if !matches!(outcome, Err(SimulationError::Fatal(_))) {
-            place.give_back(worker);
+        match &self.inside {
+            Inside::States(twin) => twin.simulate(theta, drive, noise),
+            Inside::Steps(twin) => twin.simulate(theta, drive),
         }
-        outcome
+    }
+
+    fn equations(self: Arc<Self>) -> Option<Composed> {
+        match &self.inside {
+            Inside::States(twin) => twin.clone().equations(),
+            Inside::Steps(_) => None,
+        }
     }
 }
