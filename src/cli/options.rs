@@ -15,7 +15,7 @@ pub(super) struct External {
     /// Simulator program that reads and writes lines of JSON; started without a shell.
     #[arg(long, global = true, value_name = "COMMAND")]
     pub program: Option<String>,
-    /// FMU (FMI 2.0 or 3.0, co-simulation); needs a build with the feature fmi.
+    /// FMU (FMI 2.0 or 3.0: model exchange or co-simulation); needs a build with the feature fmi.
     #[arg(long, global = true, value_name = "M.fmu", conflicts_with = "program")]
     pub fmu: Option<PathBuf>,
     /// Parameters, inputs and outputs to use from the FMU; if no variable of a kind is named, all of that kind are used.

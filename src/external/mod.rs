@@ -3,7 +3,7 @@
 //! | the simulator is … | look at |
 //! |---|---|
 //! | a program in any language that reads and writes lines | [`program`] |
-//! | an FMU (FMI 2.0 or 3.0, co-simulation) | `fmu`, of the cargo feature `fmi` |
+//! | an FMU (FMI 2.0 or 3.0, model exchange or co-simulation) | `fmu`, of the cargo feature `fmi` |
 
 #[cfg(feature = "fmi")]
 pub mod fmu;

@@ -1,7 +1,8 @@
 //! The archive that an FMU is.
 
-use super::description::{Interface, ModelDescription, Version};
+use super::description::{Interface, ModelDescription};
 use super::unpack::{MOST_BYTES, unpack};
+use super::variable::Version;
 use crate::storage::files::with_remedy;
 use crate::storage::untrusted::read;
 use crate::study::StudyError;

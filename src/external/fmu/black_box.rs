@@ -1,8 +1,9 @@
 //! An FMU that makes its own steps (FMI for co-simulation).
 
 use super::archive::Archive;
-use super::description::{FmuVariable, ModelDescription};
+use super::description::ModelDescription;
 use super::instance::Instance;
+use super::variable::FmuVariable;
 use super::worker::{FmuWorker, References};
 use crate::external::lending::Lending;
 use crate::record::{Drive, Signal};

@@ -1,6 +1,7 @@
 //! Descriptions that are read, chosen and refused.
 
 use super::description::*;
+use super::variable::*;
 use crate::record::{Quantity, Signals};
 use crate::study::{InputPlan, RecordPlan};
 use crate::twin::Parameter;

@@ -1,6 +1,7 @@
 //! Entries for the fuzz tests that otherwise only a whole FMU reaches. No part of the library's interface.
 
-use super::description::{FmuVariable, ModelDescription};
+use super::description::ModelDescription;
+use super::variable::FmuVariable;
 use crate::record::Signals;
 
 /// Reads a text as a `modelDescription.xml`.

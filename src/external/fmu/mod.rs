@@ -12,6 +12,7 @@ pub(crate) mod fuzzing;
 mod instance;
 mod structure;
 mod unpack;
+mod variable;
 mod worker;
 
 use super::check_call;
@@ -21,10 +22,11 @@ use crate::study::{RecordPlan, Study, StudyError};
 use crate::twin::{Composed, DigitalTwin, Noise, ParameterSpace, SimulationError};
 use archive::{Archive, refused};
 use black_box::SteppedFmu;
-use description::{FmuVariable, Interface, ModelDescription};
+use description::{Interface, ModelDescription};
 use exchange::ExchangeTwin;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use variable::FmuVariable;
 
 /// Settings of an FMU.
 ///
@@ -61,7 +63,7 @@ pub struct FmuTwin {
     plan: RecordPlan,
 }
 
-/// What is run.
+/// Equations or steps.
 enum Inside {
     States(Arc<ExchangeTwin>),
     Steps(SteppedFmu),

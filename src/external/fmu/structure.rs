@@ -1,6 +1,6 @@
 //! Continuous states and event indicators of a model's equations, as its structure lists them.
 
-use super::description::{FmuVariable, Types, Version, attribute, child, real, variables};
+use super::variable::{FmuVariable, Types, Version, attribute, child, real, variables};
 use roxmltree::Node;
 
 /// Most event indicators: each is asked at every step.

@@ -4,7 +4,7 @@
 //! from the instance as it was initialised. Where a relation is another one there, the FMU treats that as an event first; the instance then is
 //! initialised again before it is asked elsewhere.
 
-use super::Model;
+use super::ExchangeModel;
 use super::instance::ExchangeInstance;
 use crate::twin::SimulationError;
 
@@ -18,16 +18,16 @@ type Outcome<T> = Result<T, SimulationError>;
 
 /// Arguments of an evaluation.
 #[derive(Clone, Copy)]
-pub(super) struct At<'a> {
+pub(super) struct EvaluatedAt<'a> {
     /// On the FMU's clock.
     pub t: f64,
     pub u: &'a [f64],
     pub x: &'a [f64],
 }
 
-/// What an event of the FMU is of.
+/// FmuEvent of an event.
 #[derive(Clone, Copy)]
-pub(super) enum Cause {
+pub(super) enum FmuEvent {
     /// The indicator of this index becomes positive (`true`) or negative.
     Indicator(usize, bool),
     Time,
@@ -41,7 +41,7 @@ enum Ready {
 }
 
 /// An instance, its parameters, and what it was told last.
-pub(super) struct Bench {
+pub(super) struct ExchangeBench {
     instance: ExchangeInstance,
     pub theta: Vec<f64>,
     /// When it was used last.
@@ -54,16 +54,16 @@ pub(super) struct Bench {
     first_event: Option<f64>,
     /// Times of foreseen events, where they were asked.
     times: Option<Vec<f64>>,
-    /// What is set; not a number where that is unknown.
+    /// Arguments that are set; not a number where that is unknown.
     t: f64,
     u: Vec<f64>,
     x: Vec<f64>,
     indicators: Vec<f64>,
 }
 
-impl Bench {
+impl ExchangeBench {
     /// With parameters, which are set when it is used.
-    pub fn new(model: &Model, theta: &[f64]) -> Result<Self, fmi::Error> {
+    pub fn new(model: &ExchangeModel, theta: &[f64]) -> Result<Self, fmi::Error> {
         let states = model.states;
         Ok(Self {
             instance: ExchangeInstance::new(&model.archive)?,
@@ -101,7 +101,7 @@ impl Bench {
     /// # Errors
     ///
     /// Parameters that the FMU refuses: once said, it is remembered.
-    pub fn prepare(&mut self, model: &Model) -> Outcome<()> {
+    pub fn prepare(&mut self, model: &ExchangeModel) -> Outcome<()> {
         match &self.ready {
             Ready::Yes => return Ok(()),
             Ready::Refused(problem) => return Err(SimulationError::Failed(problem.clone().into())),
@@ -132,31 +132,46 @@ impl Bench {
     }
 
     /// The states after the initialisation.
-    pub fn start(&mut self, model: &Model, x: &mut [f64]) -> Outcome<()> {
+    pub fn start(&mut self, model: &ExchangeModel, x: &mut [f64]) -> Outcome<()> {
         self.prepare(model)?;
         x.copy_from_slice(&self.start);
         Ok(())
     }
 
-    pub fn rates(&mut self, model: &Model, at: At<'_>, dx: &mut [f64]) -> Outcome<()> {
+    pub fn rates(
+        &mut self,
+        model: &ExchangeModel,
+        at: EvaluatedAt<'_>,
+        dx: &mut [f64],
+    ) -> Outcome<()> {
         self.place(model, at)?;
         self.instance.rates(dx)
     }
 
-    pub fn outputs(&mut self, model: &Model, at: At<'_>, y: &mut [f64]) -> Outcome<()> {
+    pub fn outputs(
+        &mut self,
+        model: &ExchangeModel,
+        at: EvaluatedAt<'_>,
+        y: &mut [f64],
+    ) -> Outcome<()> {
         self.place(model, at)?;
         self.instance.get(&model.references.outputs, y)
     }
 
     /// An event indicator, relations being as at the start: its zero is where they change.
-    pub fn indicator(&mut self, model: &Model, at: At<'_>, index: usize) -> Outcome<f64> {
+    pub fn indicator(
+        &mut self,
+        model: &ExchangeModel,
+        at: EvaluatedAt<'_>,
+        index: usize,
+    ) -> Outcome<f64> {
         self.prepare(model)?;
         self.set(model, at)?;
         Ok(self.indicators[index])
     }
 
     /// Times of foreseen events, up to the most.
-    pub fn times(&mut self, model: &Model) -> Outcome<&[f64]> {
+    pub fn times(&mut self, model: &ExchangeModel) -> Outcome<&[f64]> {
         if self.times.is_none() {
             self.prepare(model)?;
             let mut times = vec![];
@@ -175,27 +190,43 @@ impl Bench {
     /// Lets the FMU change states by an event here; `step` is in seconds, the one that the event is in.
     pub fn change(
         &mut self,
-        model: &Model,
-        (cause, step): (Cause, f64),
+        model: &ExchangeModel,
+        (cause, step): (FmuEvent, f64),
         (t, u): (f64, &[f64]),
         x: &mut [f64],
     ) -> Outcome<()> {
+        let t = match cause {
+            FmuEvent::Indicator(..) => t,
+            // The FMU compares times: one that rounding left before the event is none.
+            FmuEvent::Time => {
+                let close = |time: &&f64| (**time - t).abs() <= BACK[1] * step;
+                self.times(model)?
+                    .iter()
+                    .filter(close)
+                    .fold(t, |t, time| t.max(*time))
+            }
+        };
         let mut back = x.to_vec();
         let mut rates = vec![0.0; x.len()];
-        self.rates(model, At { t, u, x }, &mut rates)?;
-        for share in BACK {
+        self.rates(model, EvaluatedAt { t, u, x }, &mut rates)?;
+        // Behind the time that an event is moved to at most.
+        let shares = match cause {
+            FmuEvent::Indicator(..) => &BACK[..],
+            FmuEvent::Time => &BACK[2..],
+        };
+        for share in shares {
             let ago = share * step;
             for ((back, x), rate) in back.iter_mut().zip(&*x).zip(&rates) {
                 *back = x - ago * rate;
             }
-            let before = At {
+            let before = EvaluatedAt {
                 t: t - ago,
                 u,
                 x: &back,
             };
             // Relations are settled there, so that this event alone is one.
             self.place(model, before)?;
-            let Cause::Indicator(index, up) = cause else {
+            let FmuEvent::Indicator(index, up) = cause else {
                 break;
             };
             self.instance.indicators(&mut self.indicators)?;
@@ -212,7 +243,11 @@ impl Bench {
     }
 
     /// Sets what is not set, and reads the indicators there.
-    fn set(&mut self, model: &Model, At { t, u, x }: At<'_>) -> Outcome<()> {
+    fn set(
+        &mut self,
+        model: &ExchangeModel,
+        EvaluatedAt { t, u, x }: EvaluatedAt<'_>,
+    ) -> Outcome<()> {
         let mut is_new = false;
         if self.t != t {
             self.t = f64::NAN;
@@ -238,7 +273,7 @@ impl Bench {
     }
 
     /// Sets time, inputs and states, with the relations that hold there.
-    fn place(&mut self, model: &Model, at: At<'_>) -> Outcome<()> {
+    fn place(&mut self, model: &ExchangeModel, at: EvaluatedAt<'_>) -> Outcome<()> {
         self.prepare(model)?;
         if let Some(first) = self.first_event.filter(|first| *first <= at.t) {
             self.distrust();
@@ -251,6 +286,9 @@ impl Bench {
                 next = self.instance.event()?.filter(|next| *next > time);
                 passed += 1;
             }
+            // What the events left is not what was set.
+            self.t = f64::NAN;
+            self.x.fill(f64::NAN);
         }
         self.set(model, at)?;
         let pairs = self.indicators.iter().zip(&self.at_start);

@@ -1,7 +1,7 @@
 //! Instances of the thread that asks: an FMU may be called from one thread only, and passes of a filter side by side have parameters of their own.
 
-use super::Model;
-use super::bench::Bench;
+use super::ExchangeModel;
+use super::bench::ExchangeBench;
 use crate::twin::SimulationError;
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,8 +14,8 @@ const MOST: usize = 16;
 
 /// Instances of one model.
 struct Desk {
-    of: Weak<Model>,
-    benches: Vec<Bench>,
+    of: Weak<ExchangeModel>,
+    benches: Vec<ExchangeBench>,
     clock: u64,
 }
 
@@ -29,9 +29,9 @@ thread_local! {
 ///
 /// No instance, or an error of the FMU; after a fatal one, the FMU is not called any more.
 pub(super) fn with<R>(
-    model: &Arc<Model>,
+    model: &Arc<ExchangeModel>,
     theta: &[f64],
-    then: impl FnOnce(&mut Bench) -> Result<R, SimulationError>,
+    then: impl FnOnce(&mut ExchangeBench) -> Result<R, SimulationError>,
 ) -> Result<R, SimulationError> {
     let corrupt = || SimulationError::fatal("the FMU is corrupt: it reported a fatal error");
     if model.is_corrupt.load(Ordering::Relaxed) {
@@ -59,7 +59,7 @@ pub(super) fn with<R>(
 }
 
 /// The desk of a model; those of models that are no more go.
-fn desk_of<'d>(desks: &'d mut Vec<Desk>, model: &Arc<Model>) -> &'d mut Desk {
+fn desk_of<'d>(desks: &'d mut Vec<Desk>, model: &Arc<ExchangeModel>) -> &'d mut Desk {
     let is_it = |desk: &Desk| std::ptr::eq(desk.of.as_ptr(), Arc::as_ptr(model));
     let index = desks.iter().position(is_it).unwrap_or_else(|| {
         desks.retain(|desk| desk.of.strong_count() > 0);
@@ -74,9 +74,13 @@ fn desk_of<'d>(desks: &'d mut Vec<Desk>, model: &Arc<Model>) -> &'d mut Desk {
 }
 
 impl Desk {
-    fn bench(&mut self, model: &Model, theta: &[f64]) -> Result<&mut Bench, SimulationError> {
+    fn bench(
+        &mut self,
+        model: &ExchangeModel,
+        theta: &[f64],
+    ) -> Result<&mut ExchangeBench, SimulationError> {
         self.clock += 1;
-        let has_it = |bench: &Bench| bench.theta == theta;
+        let has_it = |bench: &ExchangeBench| bench.theta == theta;
         let index = match self.benches.iter().position(has_it) {
             Some(index) => index,
             None => self.changed(model, theta)?,
@@ -87,10 +91,10 @@ impl Desk {
     }
 
     /// A new instance, or the one that was used longest ago, at other parameters.
-    fn changed(&mut self, model: &Model, theta: &[f64]) -> Result<usize, SimulationError> {
+    fn changed(&mut self, model: &ExchangeModel, theta: &[f64]) -> Result<usize, SimulationError> {
         let mut problem = None;
         if self.benches.len() < MOST {
-            match Bench::new(model, theta) {
+            match ExchangeBench::new(model, theta) {
                 Ok(bench) => {
                     self.benches.push(bench);
                     return Ok(self.benches.len() - 1);

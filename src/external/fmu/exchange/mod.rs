@@ -5,16 +5,17 @@ mod desk;
 mod instance;
 
 use super::archive::Archive;
-use super::description::{FmuVariable, ModelDescription};
+use super::description::ModelDescription;
+use super::variable::FmuVariable;
 use super::worker::References;
 use crate::external::name;
 use crate::twin::{Event, Integrator, Interval, Now, Outline, SimulationError, StateSpace};
-use bench::{At, Bench, Cause};
+use bench::{EvaluatedAt, ExchangeBench, FmuEvent};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// What every instance is made from.
-struct Model {
+/// Archive and references that every instance is made from.
+struct ExchangeModel {
     archive: Archive,
     references: References,
     states: usize,
@@ -30,7 +31,7 @@ struct Model {
 /// States are those of the description, from the start that the FMU computes at its parameters, within their `min` and `max`. An evaluation that
 /// the FMU refuses is not a number: the run diverges there.
 pub(super) struct ExchangeTwin {
-    model: Arc<Model>,
+    model: Arc<ExchangeModel>,
     outline: Outline,
     limits: Vec<Interval>,
 }
@@ -39,7 +40,7 @@ impl ExchangeTwin {
     /// With a first instance, initialised at its own start values.
     pub fn new(description: &ModelDescription, archive: Archive) -> Result<Self, String> {
         let references = |list: &[FmuVariable]| list.iter().map(|v| v.reference).collect();
-        let model = Arc::new(Model {
+        let model = Arc::new(ExchangeModel {
             archive,
             references: References {
                 parameters: references(&description.parameters),
@@ -53,7 +54,7 @@ impl ExchangeTwin {
         });
         let all = description.parameters.iter();
         let theta: Vec<f64> = all.map(|v| v.start).collect();
-        let first = Bench::new(&model, &theta).map_err(|error| error.to_string())?;
+        let first = ExchangeBench::new(&model, &theta).map_err(|error| error.to_string())?;
         drop(first);
         // Start values that the FMU refuses need not be those that are asked for.
         let has_times = desk::with(&model, &theta, |bench| Ok(!bench.times(&model)?.is_empty()));
@@ -86,7 +87,7 @@ impl ExchangeTwin {
         &self,
         now: &Now<'_>,
         to: &mut [f64],
-        ask: impl FnOnce(&mut Bench, &mut [f64]) -> Result<(), SimulationError>,
+        ask: impl FnOnce(&mut ExchangeBench, &mut [f64]) -> Result<(), SimulationError>,
     ) {
         let asked = desk::with(&self.model, now.theta, |bench| ask(bench, to));
         if asked.is_err() {
@@ -130,7 +131,7 @@ fn outline(description: &ModelDescription) -> Result<Outline, String> {
 }
 
 /// The event of an indicator that becomes positive (`up`) or negative.
-fn crossing(model: &Arc<Model>, index: usize, up: bool) -> Event {
+fn crossing(model: &Arc<ExchangeModel>, index: usize, up: bool) -> Event {
     let asked = model.clone();
     let margin = move |now: &Now<'_>, x: &[f64]| {
         let at = at(&asked, now, x);
@@ -142,36 +143,40 @@ fn crossing(model: &Arc<Model>, index: usize, up: bool) -> Event {
     };
     let way = if up { "above" } else { "below" };
     let name = format!("event indicator {} {way} 0", index + 1);
-    Event::when(&name, margin, changed(model, Cause::Indicator(index, up)))
+    Event::when(
+        &name,
+        margin,
+        changed(model, FmuEvent::Indicator(index, up)),
+    )
 }
 
 /// Events at times that the FMU foresees.
-fn foreseen(model: &Arc<Model>) -> Event {
+fn foreseen(model: &Arc<ExchangeModel>) -> Event {
     let asked = model.clone();
     let times = move |now: &Now<'_>| {
         let times = desk::with(&asked, now.theta, |bench| Ok(bench.times(&asked)?.to_vec()));
         let times = times.unwrap_or_default().into_iter();
         times.map(|time| time - asked.start).collect()
     };
-    Event::at("time event", times, changed(model, Cause::Time))
+    Event::at("time event", times, changed(model, FmuEvent::Time))
 }
 
 fn changed(
-    model: &Arc<Model>,
-    cause: Cause,
+    model: &Arc<ExchangeModel>,
+    cause: FmuEvent,
 ) -> impl Fn(&Now<'_>, &mut [f64]) + Send + Sync + 'static {
     let model = model.clone();
     move |now, x| {
         let clock = (model.start + now.t, now.u);
-        let change = |bench: &mut Bench| bench.change(&model, (cause, now.dt), clock, x);
+        let change = |bench: &mut ExchangeBench| bench.change(&model, (cause, now.dt), clock, x);
         if desk::with(&model, now.theta, change).is_err() {
             x.fill(f64::NAN);
         }
     }
 }
 
-fn at<'a>(model: &Model, now: &Now<'a>, x: &'a [f64]) -> At<'a> {
-    At {
+fn at<'a>(model: &ExchangeModel, now: &Now<'a>, x: &'a [f64]) -> EvaluatedAt<'a> {
+    EvaluatedAt {
         t: model.start + now.t,
         u: now.u,
         x,
