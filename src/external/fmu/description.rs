@@ -56,14 +56,14 @@ fn only_once(interface: Node<'_, '_>) -> bool {
 /// The equations where they can be run: they have states, and each thread may have instances.
 fn chosen<'a, 'i>(
     root: Node<'a, 'i>,
-    is_stateless: bool,
+    states: &Result<Vec<FmuVariable>, String>,
 ) -> Result<(Interface, Node<'a, 'i>), String> {
-    let exchange = child(root, "ModelExchange");
-    let problem = match exchange {
-        Some(_) if is_stateless => "its model exchange has no continuous states",
-        Some(node) if only_once(node) => "its model exchange allows one instance only",
-        Some(node) => return Ok((Interface::ModelExchange, node)),
-        None => "it has neither model exchange nor co-simulation",
+    let problem = match (child(root, "ModelExchange"), states) {
+        (Some(_), Err(problem)) => problem.as_str(),
+        (Some(_), Ok(states)) if states.is_empty() => "its model exchange has no continuous states",
+        (Some(node), _) if only_once(node) => "its model exchange allows one instance only",
+        (Some(node), _) => return Ok((Interface::ModelExchange, node)),
+        (None, _) => "it has neither model exchange nor co-simulation",
     };
     match child(root, "CoSimulation") {
         Some(node) => Ok((Interface::CoSimulation, node)),
@@ -92,8 +92,13 @@ impl ModelDescription {
             }
         };
         let types = declared(root, version)?;
-        let states = structure::states(root, version, &types)?;
-        let (interface, simulation) = chosen(root, states.is_empty())?;
+        let states = structure::states(root, version, &types);
+        let (interface, simulation) = chosen(root, &states)?;
+        // What only equations need is no fault of others.
+        let (states, indicators) = match interface {
+            Interface::ModelExchange => (states?, structure::indicators(root, version)?),
+            Interface::CoSimulation => (Vec::new(), 0),
+        };
         let experiment = child(root, "DefaultExperiment");
         let time = |name| experiment.map_or(Ok(None), |node| number(node, name));
         let mut found = Self {
@@ -108,7 +113,7 @@ impl ModelDescription {
             inputs: Vec::new(),
             outputs: Vec::new(),
             states,
-            indicators: structure::indicators(root, version)?,
+            indicators,
             start: time("startTime")?.unwrap_or(0.0),
             stop: time("stopTime")?,
             step: time("stepSize")?,

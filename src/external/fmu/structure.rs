@@ -48,7 +48,7 @@ pub(super) fn states(
             Some(state) => states.push(state),
             None => {
                 return Err(format!(
-                    "<{tag} {key}=\"{of}\"> is no derivative of a real scalar; export it for co-simulation"
+                    "<{tag} {key}=\"{of}\"> is no derivative of a real scalar"
                 ));
             }
         }
