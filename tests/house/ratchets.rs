@@ -278,11 +278,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 163, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 59_000, lines),
-        Ratchet::new("files", 476, files.collect()),
+        Ratchet::new("lines of code", 60_000, lines),
+        Ratchet::new("files", 484, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 491, constants(sources)),
+        Ratchet::new("named numeric constants", 497, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             3,
@@ -300,7 +300,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
             foreign_words(sources),
         ),
         Ratchet::new("folders with more than 18 files", 0, crowded(sources, 18)),
-        Ratchet::new("questions for equations", 7, questions(sources)),
+        Ratchet::new("questions for equations", 8, questions(sources)),
         Ratchet::new(
             "doc comments of odd first words",
             0,

@@ -110,3 +110,61 @@ fn what_cannot_be_used_is_named() {
         assert!(message.contains(part) || part == "line", "{message}");
     }
 }
+
+/// States of the second version go by place, those of the third by reference; derivatives say the order.
+#[test]
+fn states_are_those_that_the_structure_lists() {
+    let two = r#"<fmiModelDescription fmiVersion="2.0" modelName="M" guid="g" numberOfEventIndicators="3">
+        <ModelExchange modelIdentifier="m"/><CoSimulation modelIdentifier="c"/><ModelVariables>
+        <ScalarVariable name="x" valueReference="7" description="way"><Real start="2" unit="m" min="0"/></ScalarVariable>
+        <ScalarVariable name="n" valueReference="1"><Integer start="2"/></ScalarVariable>
+        <ScalarVariable name="v" valueReference="8"><Real/></ScalarVariable>
+        <ScalarVariable name="der(x)" valueReference="9"><Real derivative="1"/></ScalarVariable>
+        <ScalarVariable name="der(v)" valueReference="10"><Real derivative="3"/></ScalarVariable></ModelVariables>
+        <ModelStructure><Derivatives><Unknown index="5"/><Unknown index="4"/></Derivatives></ModelStructure></fmiModelDescription>"#;
+    let three = r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
+        <ModelExchange modelIdentifier="m"/><ModelVariables>
+        <Float64 name="x" valueReference="7" description="way" start="2" unit="m" min="0"/>
+        <Float64 name="v" valueReference="8" derivative="7"/>
+        <Float64 name="der(v)" valueReference="9" derivative="8"/></ModelVariables>
+        <ModelStructure><ContinuousStateDerivative valueReference="9"/><ContinuousStateDerivative valueReference="8"/>
+        <EventIndicator valueReference="3"/><EventIndicator valueReference="4"/><EventIndicator valueReference="5"/></ModelStructure>
+        </fmiModelDescription>"#;
+    for text in [two, three] {
+        let found = ModelDescription::parse(text).unwrap();
+        assert_eq!(found.interface, Interface::ModelExchange);
+        assert_eq!((found.identifier.as_str(), found.indicators), ("m", 3));
+        let [v, x] = &found.states[..] else {
+            panic!("{:?}", found.states)
+        };
+        assert_eq!((v.name.as_str(), v.reference), ("v", 8));
+        assert_eq!((x.name.as_str(), x.reference, x.start), ("x", 7, 2.0));
+        assert_eq!(
+            (x.description.as_str(), x.unit.as_str(), x.min),
+            ("way", "m", Some(0.0))
+        );
+    }
+    // Equations that cannot be run give way to steps.
+    for (from, to) in [
+        ("<Unknown index=\"5\"/>", "<Unknown index=\"2\"/>"),
+        (
+            "<ModelExchange ",
+            "<ModelExchange canBeInstantiatedOnlyOncePerProcess=\"true\" ",
+        ),
+    ] {
+        let found = ModelDescription::parse(&two.replace(from, to)).unwrap();
+        assert_eq!(
+            (found.interface, found.indicators),
+            (Interface::CoSimulation, 0)
+        );
+    }
+    let alone = three.replace(
+        "<ContinuousStateDerivative valueReference=\"9\"/>",
+        "<ContinuousStateDerivative valueReference=\"70\"/>",
+    );
+    let message = ModelDescription::parse(&alone).unwrap_err();
+    assert!(
+        message.contains("valueReference=\"70\"") && message.contains("for co-simulation"),
+        "{message}"
+    );
+}
