@@ -55,7 +55,7 @@ pub struct FmuSettings {
 /// sample. A step that fails is a divergence at its time; a refused initialisation costs the run. Instances are reset between
 /// runs and have a thread each. The FMU runs in this process: if it crashes or hangs, so does this.
 pub struct FmuTwin {
-    inside: Inside,
+    inside: Interior,
     path: PathBuf,
     name: String,
     parameters: ParameterSpace,
@@ -64,7 +64,7 @@ pub struct FmuTwin {
 }
 
 /// Equations or steps.
-enum Inside {
+enum Interior {
     States(Arc<ExchangeTwin>),
     Steps(SteppedFmu),
 }
@@ -116,21 +116,21 @@ impl FmuTwin {
         let inside = match description.interface {
             Interface::ModelExchange => {
                 let twin = ExchangeTwin::new(&description, archive).map_err(failed)?;
-                Inside::States(Arc::new(twin))
+                Interior::States(Arc::new(twin))
             }
             Interface::CoSimulation => {
                 let twin = SteppedFmu::new(&description, archive, settings.workers);
-                Inside::Steps(twin.map_err(|e| failed(e.to_string()))?)
+                Interior::Steps(twin.map_err(|e| failed(e.to_string()))?)
             }
         };
         Ok(Self::of(inside, &description, path))
     }
 
-    fn of(inside: Inside, description: &ModelDescription, path: &Path) -> Self {
+    fn of(inside: Interior, description: &ModelDescription, path: &Path) -> Self {
         let quantities = |list: &[FmuVariable]| list.iter().map(FmuVariable::quantity).collect();
         let (parameters, signals) = match &inside {
-            Inside::States(twin) => (twin.parameters(), twin.signals()),
-            Inside::Steps(_) => {
+            Interior::States(twin) => (twin.parameters(), twin.signals()),
+            Interior::Steps(_) => {
                 let parameters = description.parameters.iter().map(FmuVariable::parameter);
                 let signals = Signals {
                     inputs: quantities(&description.inputs),
@@ -188,15 +188,15 @@ impl DigitalTwin for FmuTwin {
     ) -> Result<Signal, SimulationError> {
         check_call(&self.parameters, &self.signals, theta, drive)?;
         match &self.inside {
-            Inside::States(twin) => twin.simulate(theta, drive, noise),
-            Inside::Steps(twin) => twin.simulate(theta, drive),
+            Interior::States(twin) => twin.simulate(theta, drive, noise),
+            Interior::Steps(twin) => twin.simulate(theta, drive),
         }
     }
 
     fn equations(self: Arc<Self>) -> Option<Composed> {
         match &self.inside {
-            Inside::States(twin) => twin.clone().equations(),
-            Inside::Steps(_) => None,
+            Interior::States(twin) => twin.clone().equations(),
+            Interior::Steps(_) => None,
         }
     }
 }
