@@ -17,7 +17,7 @@ type ChangeOf = dyn Fn(&Now<'_>, &mut [f64]) + Send + Sync;
 ///
 /// ```
 /// use truetwin::prelude::*;
-/// use truetwin::twin::Event;
+/// use truetwin::twin::{Event, Integrator};
 ///
 /// /// A ball that loses a share of its speed at the floor.
 /// struct Ball;
