@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 use truetwin::record::{Drive, Signal};
-use truetwin::twin::{DigitalTwin, Noise, SimulationError, StateSpace, Twin};
+use truetwin::twin::{Noise, SimulationError, StateSpace, Twin};
 use truetwin::twins::CascadedTanks;
 
 const TANKS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
