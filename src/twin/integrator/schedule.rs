@@ -24,8 +24,9 @@ const JUMPS: [f64; 2] = [2.0, 16.0];
 /// single run [`MANY`], which locate some jumps. Half gives up before a jump that all meet at one time is located, twice as many cost twice.
 const FEW: usize = 8;
 /// Least number of steps of one length in a sample where rates jump again and again, as dry friction does at rest: the time of a jump is known
-/// to a fraction of a step. Twice as many halve that; half of them show beside the noise of a sample.
-const EVEN: usize = 8;
+/// to a fraction of a step. With a quarter of them the evidence of dry friction in a pendulum came out twelve nats low; twice as many halve what is
+/// left, one nat.
+const EVEN: usize = 32;
 /// Least factor in the number of steps by which the implicit method wins: what its steps cost more.
 const WORTH: f64 = 4.0;
 

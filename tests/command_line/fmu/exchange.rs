@@ -158,7 +158,7 @@ fn an_effect_on_a_state_inside_is_named_as_of_the_reference_twin() {
         "ceiling.toml",
         "[[effect]]\nid = 'state-ceiling'\ntarget = 'h1'\nto = 'h2'\nmagnitudes = { level = 3.0, spill = 0.5 }\n",
     );
-    let rest = "[noise]\nh1 = 0.1\nh2 = 0.1\ny = 0.15\n[start]\nh1 = 0.0\nh2 = 0.0\n[record]\nintegrator = 'euler'\n\
+    let rest = "[noise]\nh1 = 0.1\nh2 = 0.1\ny = 0.15\n[start]\nh1 = 0.0\nh2 = 0.0\n[record]\nintegrator = 'euler'\nsamples = 160\n\
         [prior]\nk1 = [0.4, 0.8]\nk2 = [0.4, 0.8]\nk3 = [0.4, 0.8]\nk4 = [0.8, 1.2]\n";
     write("rust.toml", &format!("twin = 'tanks'\n{rest}"));
     write("fmu.toml", &format!("twin = 'FmuTanks'\n{rest}"));
@@ -168,7 +168,7 @@ fn an_effect_on_a_state_inside_is_named_as_of_the_reference_twin() {
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {said}");
         String::from_utf8(output.stdout).unwrap()
     };
-    let line = "simulate --twin tanks --theta k1=0.6,k2=0.6,k3=0.6,k4=1.0 --effect ceiling.toml --seed 1 --out overflow.csv";
+    let line = "simulate --study rust.toml --theta k1=0.6,k2=0.6,k3=0.6,k4=1.0 --effect ceiling.toml --seed 1 --out overflow.csv";
     done(&line.split(' ').collect::<Vec<_>>());
     let external = ["--study", "fmu.toml", "--fmu", &path];
     let own = ["--study", "rust.toml"];
