@@ -106,8 +106,8 @@ impl Falls {
     }
 }
 
-/// What became of steps to a tolerance.
-enum Outcome {
+/// Outcome of steps to a tolerance.
+enum SampleSteps {
     /// They cover the whole way.
     Done,
     /// Rates jump again and again.
@@ -116,7 +116,7 @@ enum Outcome {
     Many { covered: f64 },
 }
 
-/// What the steps of a way heed beside the tolerance.
+/// Limits and events that the steps of a way heed beside the tolerance.
 #[derive(Clone)]
 pub(super) struct WayRules<'c> {
     pub limits: &'c [(usize, Interval)],
@@ -242,21 +242,21 @@ impl SubstepSchedule {
             false => usize::MAX,
         };
         let mut outcome = self.tried(path, x, rules, most);
-        if let Outcome::Many { covered } = outcome {
+        if let SampleSteps::Many { covered } = outcome {
             let explicit = MANY as f64 / covered.max(SHORTEST);
             let most = (explicit / WORTH).min(MOST_SUBSTEPS as f64) as usize;
             x.copy_from_slice(&start);
             self.sizes.clone_from(&sizes);
             self.is_implicit = true;
             outcome = self.tried(path, x, rules, most);
-            if !matches!(outcome, Outcome::Done) {
+            if !matches!(outcome, SampleSteps::Done) {
                 self.is_implicit = false;
                 x.copy_from_slice(&start);
                 self.sizes.clone_from(&sizes);
                 outcome = self.tried(path, x, rules, usize::MAX);
             }
         }
-        self.was_rough = matches!(outcome, Outcome::Rough);
+        self.was_rough = matches!(outcome, SampleSteps::Rough);
         if self.was_rough {
             x.copy_from_slice(&start);
             self.sizes.clone_from(&sizes);
@@ -275,7 +275,7 @@ impl SubstepSchedule {
         x: &mut [f64],
         rules: &WayRules<'_>,
         most: usize,
-    ) -> Outcome {
+    ) -> SampleSteps {
         let (n, dt) = (self.sizes.len(), path.now.dt);
         let mut rules = rules.clone();
         let order = match self.is_implicit {
@@ -288,20 +288,20 @@ impl SubstepSchedule {
         let patience = if x.len() > n { FEW } else { MANY };
         self.stretches.clear();
         if self.was_rough && self.jumps(path, x, 0.0, [1.0 / EVEN as f64, 1.0]) {
-            return Outcome::Rough;
+            return SampleSteps::Rough;
         }
         while from < 1.0 {
             if steps >= patience && falls.repeat() {
-                return Outcome::Rough;
+                return SampleSteps::Rough;
             }
             if steps > 0 && steps % patience == 0 {
                 let lengths = JUMPS.map(|factor| (factor * next / dt).min(1.0 - from));
                 if self.jumps(path, x, from, lengths) {
-                    return Outcome::Rough;
+                    return SampleSteps::Rough;
                 }
             }
             if steps >= most && falls.are_stiff() {
-                return Outcome::Many { covered: from };
+                return SampleSteps::Many { covered: from };
             }
             if steps == MOST_SUBSTEPS {
                 shortest = (1.0 - from) / MOST_SUBSTEPS as f64;
@@ -329,7 +329,7 @@ impl SubstepSchedule {
             }
         }
         self.next = next;
-        Outcome::Done
+        SampleSteps::Done
     }
 
     /// Returns whether rates jump in steps of these lengths, beyond the tolerance: errors then grow in proportion to the length. Those of smooth rates

@@ -199,9 +199,61 @@ fn the_method_follows_the_system() {
     assert!(taken.most < 100, "{taken:?}");
 }
 
-/// All points take the steps of the centre: beside it, differences are those of one smooth function.
+/// Points around a body that dry friction holds: steps of one length where each point comes to rest at its own time, neither implicit ones nor steps
+/// without end; each point ends where many short steps end, to what one step moves it.
 #[test]
-fn points_take_the_steps_of_the_centre() {
+fn points_that_friction_stops_take_steps_of_one_length() {
+    let force = |t: f64| 1.2 * (3.0 * t).sin();
+    let rates = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
+        for (x, dx) in x.iter().zip(dx) {
+            *dx = force(now.t) - x.signum() - 0.1 * x;
+        }
+    };
+    let (dt, start) = (0.05, [0.0, 0.02, -0.02, 0.05, -0.05]);
+    let limits = [Interval::EVERYTHING];
+    let rule = (Integrator::Adaptive, Stepping::default());
+    let mut work = Workspace::of(&[], &limits, rule, &[]);
+    let (mut points, mut exact) = (start, start);
+    for k in 0..60 {
+        let t = f64::from(k) * dt;
+        work.carry(1, &Now::new(t, dt, &[], &[]), &mut points, rates);
+        let short = dt / 2000.0;
+        for i in 0..2000 {
+            let mut dx = [0.0; 5];
+            let now = Now::new(t + f64::from(i) * short, short, &[], &[]);
+            rates(&now, &exact, &mut dx);
+            for (x, dx) in exact.iter_mut().zip(dx) {
+                *x += short * dx;
+            }
+        }
+        for (x, exact) in points.iter().zip(exact) {
+            assert!((x - exact).abs() < 2.2 * dt / 32.0, "{k}: {x} {exact}");
+        }
+    }
+    let taken = work.steps_taken().unwrap();
+    assert_eq!((taken.implicit, taken.most), (0, 32), "{taken:?}");
+    assert!(taken.substeps > 20 * 32, "{taken:?}");
+}
+
+/// An outflow by the root of a level that runs empty is steep, and not stiff.
+#[test]
+fn what_is_steep_at_one_place_stays_explicit() {
+    let adaptive = (Integrator::Adaptive, TOLERANCE);
+    let (_, taken) = carried(adaptive, [1.0], (50.0, 100), |t, x, dx| {
+        let pump = if (t / 10.0) as usize % 2 == 0 {
+            0.0
+        } else {
+            0.8
+        };
+        dx[0] = pump - 0.5 * x[0].max(0.0).sqrt();
+    });
+    assert_eq!(taken.implicit, 0, "{taken:?}");
+    assert!(taken.substeps < 600, "{taken:?}");
+}
+
+/// All points take one schedule: differences are those of one smooth function.
+#[test]
+fn points_take_the_same_steps() {
     let rates = |_: &Now<'_>, x: &[f64], dx: &mut [f64]| {
         for (x, dx) in x.chunks_exact(2).zip(dx.chunks_exact_mut(2)) {
             van_der_pol(0.0, x, dx);
