@@ -229,9 +229,8 @@ fn entries(table: &str, value: &Value) -> Result<Vec<(String, Value)>, String> {
 
 /// Checks the unit of an entry.
 fn with_unit(table: &str, entry: (String, Value)) -> Result<(String, Value), String> {
-    match entry.1.get("unit").and_then(Value::as_str) {
-        Some(unit) => name::check_unit(unit).map_err(|problem| format!("{table}: {problem}"))?,
-        None => {}
+    if let Some(unit) = entry.1.get("unit").and_then(Value::as_str) {
+        name::check_unit(unit).map_err(|problem| format!("{table}: {problem}"))?;
     }
     Ok(entry)
 }

@@ -114,7 +114,7 @@ impl EventWatch {
     ) -> Self {
         let margins = path.at(0.0, |now| events.calls.margins(now, x));
         let condition = |(i, margin): (usize, &f64)| match before {
-            _ if !(*margin > 0.0) => WatchState::False,
+            _ if !is_true(*margin) => WatchState::False,
             Some(before) if !before[i] => WatchState::Pending,
             _ => WatchState::True,
         };
@@ -184,7 +184,7 @@ impl EventWatch {
         x: &[f64],
     ) -> Vec<usize> {
         let has_turned = |i: &usize| match self.conditions[*i] {
-            _ if !(margins[*i] > 0.0) => false,
+            _ if !is_true(margins[*i]) => false,
             WatchState::False => true,
             WatchState::True => false,
             WatchState::Pending => grows(events, path, (share, *i), x),
@@ -194,7 +194,7 @@ impl EventWatch {
 
     fn keep_false(&mut self, margins: &[f64]) {
         for (condition, margin) in self.conditions.iter_mut().zip(margins) {
-            if !(*margin > 0.0) {
+            if !is_true(*margin) {
                 *condition = WatchState::False;
             }
         }
@@ -221,14 +221,14 @@ impl EventWatch {
                 events.calls.margins(now, x)
             });
             for (i, (before, after)) in margins.iter().zip(&after).enumerate() {
-                if i != event && !(*before > 0.0) && *after > 0.0 {
+                if i != event && !is_true(*before) && is_true(*after) {
                     waiting.push(i);
                 }
             }
             margins = after;
         }
         for (i, fired) in fired.into_iter().enumerate() {
-            if !(margins[i] > 0.0) {
+            if !is_true(margins[i]) {
                 self.conditions[i] = WatchState::False;
             } else if fired {
                 self.conditions[i] = match grows(events, path, (share, i), x) {
@@ -379,4 +379,9 @@ fn located(
         last_is_true = Some(is_true);
     }
     high
+}
+
+/// Returns whether a condition of this margin is true; one that is no number is false.
+fn is_true(margin: f64) -> bool {
+    margin > 0.0
 }
