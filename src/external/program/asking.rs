@@ -13,6 +13,7 @@ pub(super) struct Asker {
     pub description: Description,
     pub health: Health,
     retries: usize,
+    /// Number of the next request; the first is 1.
     requests: AtomicU64,
 }
 
@@ -31,7 +32,7 @@ impl Asker {
             description,
             health: Health::default(),
             retries,
-            requests: AtomicU64::new(0),
+            requests: AtomicU64::new(1),
         }
     }
 
