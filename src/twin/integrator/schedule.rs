@@ -14,8 +14,8 @@ use serde::Serialize;
 const SAFETY: f64 = 0.9;
 /// Least and most that a step changes the next by: estimates of errors are rough.
 const CHANGE: (f64, f64) = (0.2, 5.0);
-/// Explicit steps of one sample from which the implicit method is tried, whose step costs some three of these with few states. Twice as many
-/// find stiffness later; half tries it where rates are fast and not stiff.
+/// Explicit steps of one sample, at the limit of their stability, from which the implicit method is tried, whose step costs some three of these with
+/// few states. Twice as many find stiffness later; half tries it where few steps would do.
 const MANY: usize = 32;
 /// Lengths of two steps that tell rates that jump from those that are stiff, over the length that the tolerance allows: both are beyond it, and
 /// not so far that all detail is lost.
@@ -120,7 +120,7 @@ enum SampleSteps {
 #[derive(Clone)]
 pub(super) struct WayRules<'c> {
     pub limits: &'c [(usize, Interval)],
-    /// Events, and those of the only point.
+    /// All events, and what the one point that is carried has had of them.
     pub events: Option<(&'c EventsOfWay<'c>, EventWatch)>,
 }
 
@@ -300,7 +300,8 @@ impl SubstepSchedule {
                     return SampleSteps::Rough;
                 }
             }
-            if steps >= most && falls.are_stiff() {
+            // Explicit steps that are short for another reason than stiffness go on.
+            if steps >= most && (self.is_implicit || falls.are_stiff()) {
                 return SampleSteps::Many { covered: from };
             }
             if steps == MOST_SUBSTEPS {
