@@ -41,10 +41,7 @@ pub(super) fn entries<'a, 't>(
             format!("{table} is a table; write it in brackets, and its entries below"),
         );
     };
-    if keys.len() > MOST {
-        let problem = format!("{} entries of {table}; there may be {MOST}", keys.len());
-        return source.error(value.span().start, problem);
-    }
+    check_number(source, value.span().start, (table, keys.len()))?;
     let mut entries: Vec<TableEntry<'_, '_>> = (keys.iter())
         .map(|(key, value)| TableEntry {
             source,
@@ -56,6 +53,21 @@ pub(super) fn entries<'a, 't>(
         .collect();
     entries.sort_by_key(|entry| entry.byte);
     Ok(entries)
+}
+
+/// Checks that a table has no more entries than a file may have.
+fn check_number(
+    source: SourceText<'_>,
+    byte: usize,
+    (table, entries): (&str, usize),
+) -> Result<(), EquationsError> {
+    match entries > MOST {
+        true => source.error(
+            byte,
+            format!("{entries} entries of {table}; there may be {MOST}"),
+        ),
+        false => Ok(()),
+    }
 }
 
 /// Returns the entries of a list of tables, `[[table]]`.
@@ -75,10 +87,7 @@ pub(super) fn entry_list<'a, 't>(
             return source.error(byte, problem);
         }
     };
-    if all.len() > MOST {
-        let problem = format!("{} entries of {table}; there may be {MOST}", all.len());
-        return source.error(byte, problem);
-    }
+    check_number(source, byte, (table, all.len()))?;
     let entry = |value: &'a Spanned<DeValue<'t>>| TableEntry {
         source,
         table,

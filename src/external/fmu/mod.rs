@@ -51,7 +51,7 @@ pub struct FmuSettings {
 /// Equations have the continuous states of the description by name, known starts, limits from their `min` and `max`, and the events of the FMU.
 /// Their integrator is [`Adaptive`](crate::twin::Integrator::Adaptive). Each thread has instances of its own.
 ///
-/// Of co-simulation, row k is read when time k·Δt is reached, before input k is set: an output that depends on an input directly lags it by a
+/// In co-simulation, row k is read when time k·Δt is reached, before input k is set: an output that depends on an input directly lags it by a
 /// sample. A step that fails is a divergence at its time; a refused initialisation costs the run. Instances are reset between
 /// runs and have a thread each. The FMU runs in this process: if it crashes or hangs, so does this.
 pub struct FmuTwin {

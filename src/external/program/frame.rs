@@ -2,6 +2,7 @@
 
 use super::asking::Reply;
 use super::inside::ServedMethod;
+use super::protocol::check_id;
 use crate::storage::untrusted::{excerpt, message};
 use crate::twin::Now;
 use serde::Deserialize;
@@ -97,12 +98,7 @@ pub(super) fn reply(
         let error = message(&error.to_string());
         format!("{error}; write answers alone to standard output, and all else to standard error")
     })?;
-    if told.id != id {
-        return Err(format!(
-            "the answer has id {}, the request has {id}; answer each request once, in order",
-            told.id
-        ));
-    }
+    check_id(told.id, id)?;
     let expected = rows * points * size_of::<f64>();
     match (told.bytes, told.error) {
         (Some(bytes), None) if bytes == expected => Ok(Reply::Good((), bytes)),

@@ -135,6 +135,16 @@ impl<'de> Deserialize<'de> for ToldOutputs {
     }
 }
 
+/// Checks that an answer is that of request `id`.
+pub(super) fn check_id(told: u64, id: u64) -> Result<(), String> {
+    match told == id {
+        true => Ok(()),
+        false => Err(format!(
+            "the answer has id {told}, the request has {id}; answer each request once, in order"
+        )),
+    }
+}
+
 /// Reads the answer to request `id`; the error says what is wrong with it and what to answer instead.
 pub(super) fn answer(
     line: &str,
@@ -149,12 +159,7 @@ pub(super) fn answer(
             format!("{error}; write answers alone to standard output, one line each, and all else to standard error")
         })?,
     };
-    if told.id != id {
-        return Err(format!(
-            "the answer has id {}, the request has {id}; answer each request once, in order",
-            told.id
-        ));
-    }
+    check_id(told.id, id)?;
     match (told.outputs, told.diverged, told.error) {
         (Some(outputs), None, None) => stack(outputs.0, signals, drive),
         (None, Some(at), None) => {

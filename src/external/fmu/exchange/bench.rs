@@ -25,7 +25,7 @@ pub(super) struct EvaluatedAt<'a> {
     pub x: &'a [f64],
 }
 
-/// FmuEvent of an event.
+/// Cause of an event.
 #[derive(Clone, Copy)]
 pub(super) enum FmuEvent {
     /// The indicator of this index becomes positive (`true`) or negative.
