@@ -97,6 +97,25 @@ macro_rules! debug_by_name {
     };
 }
 
+/// Defines numbers that belong together, each beside its unit and its reason: a struct of them, and its one value.
+macro_rules! numbers {
+    (
+        $(#[$of_struct:meta])*
+        $shown:vis const $value_name:ident: $struct_name:ident = {
+            $($(#[$of_field:meta])* $field:ident: $kind:ty = $value:expr,)*
+        }
+    ) => {
+        $(#[$of_struct])*
+        $shown struct $struct_name {
+            $($(#[$of_field])* pub $field: $kind,)*
+        }
+
+        $shown const $value_name: $struct_name = $struct_name {
+            $($field: $value,)*
+        };
+    };
+}
+
 // Unit tests include examples, which name the crate.
 #[cfg(test)]
 extern crate self as truetwin;

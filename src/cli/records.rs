@@ -3,7 +3,9 @@
 use super::failure::Failure;
 use super::output;
 use crate::record::{Record, RecordReader, column_names};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 /// A value is an outlier if it exceeds this multiple of nearly all magnitudes of its channel.
 const FAR: f64 = 1e6;
@@ -37,8 +39,12 @@ pub(super) fn read(
     Ok((records, validation))
 }
 
+/// Warns, once of the same: each of several studies reads the records, and one that is fitted may validate, too.
 fn warn(text: &str) {
-    output::say(&format!("warning: {text}"));
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    if SAID.lock().is_ok_and(|mut said| said.insert(text.into())) {
+        output::say(&format!("warning: {text}"));
+    }
 }
 
 /// Warns of the largest value of a record if it is far beyond the others of its channel.

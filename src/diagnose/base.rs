@@ -4,7 +4,6 @@ use super::candidates;
 use super::feedback::reacting;
 use super::settings::{Ablation, DiagnoseSettings};
 use super::step::OtherStep;
-use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::climb::{climb, fit};
 use crate::fit::problem::Problem;
@@ -13,6 +12,7 @@ use crate::fit::starts::thorough;
 use crate::fit::{ITERATIONS, Passes};
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
+use crate::hypothesis::search::SEARCH;
 use crate::hypothesis::search::frequencies::frequencies;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::shared;
@@ -129,7 +129,7 @@ impl Base {
         let starts: Vec<Vec<f64>> = thetas.iter().map(|theta| problem.full(theta)).collect();
         let fitted = fit(problem, &starts, ITERATIONS)?;
         let better = (fitted.and_then(|fitted| self.model.refitted(fitted)))
-            .filter(|model| model.log_evidence > self.model.log_evidence + Thresholds::BETTER);
+            .filter(|model| model.log_evidence > self.model.log_evidence + SEARCH.better);
         let Some(model) = better else {
             return Ok(None);
         };
@@ -138,7 +138,7 @@ impl Base {
 
     /// The same twin fitted to other records from where it is; `None` where that cannot be done.
     pub fn on(&self, records: Arc<[Record]>) -> Result<Option<Self>, StudyError> {
-        let problem = self.model.problem.on(records).until(Thresholds::BETTER);
+        let problem = self.model.problem.on(records).until(SEARCH.better);
         let start = problem.full(&self.theta);
         let fitted = climb(&problem, &start, ITERATIONS)?;
         let model = fitted.and_then(|fitted| {

@@ -30,7 +30,6 @@ mod greedy;
 mod locate;
 mod outcome;
 mod predictive;
-mod price;
 mod prior;
 mod quantify;
 mod report;
@@ -56,6 +55,6 @@ pub use settings::{Ablation, DiagnoseSettings};
 pub(crate) use true_effects::true_fit;
 
 /// Nats within which explanations are rivals.
-pub(crate) const RIVALS: f64 = thresholds::Thresholds::RIVALS;
+pub(crate) const RIVALS: f64 = thresholds::THRESHOLDS.rivals;
 /// Level of the intervals.
-pub(crate) const INTERVAL_LEVEL: f64 = thresholds::Thresholds::INTERVAL_LEVEL;
+pub(crate) const INTERVAL_LEVEL: f64 = thresholds::THRESHOLDS.interval_level;

@@ -1,6 +1,6 @@
 //! The twin with θ within its prior: whether the record drives θ out of it, and what would keep it inside.
 
-use super::thresholds::Thresholds;
+use super::thresholds::THRESHOLDS;
 use crate::fit::axis::Axis;
 use crate::fit::climb::{Fitted, climb, fit};
 use crate::fit::problem::Problem;
@@ -87,7 +87,7 @@ pub(in crate::diagnose) fn absorbing(
 ) -> Result<Vec<Explanation>, StudyError> {
     let breadth = Breadth::of(within, false).of_all();
     let mut found = listed(within, terms, Before::default(), breadth)?;
-    let best = free.fitted.log_likelihood - Thresholds::ABSORBS;
+    let best = free.fitted.log_likelihood - THRESHOLDS.absorbs;
     let is_as_good = |model: &Model| model.fitted.log_likelihood >= best;
     found.retain(|e| e.model.as_ref().is_some_and(is_as_good));
     Ok(found)

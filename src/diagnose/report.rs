@@ -18,7 +18,7 @@ use super::quantify::share::{Measures, shrinkage};
 use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
 use super::step::OtherStep;
-use super::thresholds::Thresholds;
+use super::thresholds::THRESHOLDS;
 use crate::fit::Warning;
 use crate::fit::posterior::{PosteriorSample, posterior};
 use crate::hypothesis::search::explanation::Explanation;
@@ -409,5 +409,5 @@ fn is_nearer(model: &Model, twin: &Model) -> Result<bool, StudyError> {
         let errors = runner.and_then(|runner| runner.errors(&model.problem.records[0], 0));
         Ok(errors.map_or(f64::INFINITY, |errors| root(&errors)))
     };
-    Ok(error(model)? < Thresholds::NEARER * error(twin)?)
+    Ok(error(model)? < THRESHOLDS.nearer * error(twin)?)
 }

@@ -4,8 +4,8 @@ use super::outcome::Diagnosis;
 use super::report::Report;
 use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
-use super::thresholds::Thresholds;
-use crate::likelihood::{STANDS, start_elsewhere};
+use super::thresholds::THRESHOLDS;
+use crate::likelihood::{start_elsewhere, with_better_start};
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -51,14 +51,14 @@ pub fn diagnose(
     check(study, records, validation, settings)?;
     let watch = Watch { settings, progress };
     let trusting = study.trusting_starts();
-    let mut found = searched(study, records, watch)?;
-    let study = match trusted(&trusting, (study, &found), records, watch)? {
-        Some(better) => {
-            found = better;
-            &trusting
-        }
-        None => study,
+    let found = searched(study, records, watch)?;
+    let log_z = |found: &Search<Setup<'_>>| Some(found.known.listed_log_z());
+    let again = || searched(&trusting, records, watch);
+    let (found, is_held) = match contradicts_start(study, &found, records, settings) {
+        true => with_better_start(found, log_z, again)?,
+        false => (found, false),
     };
+    let study = if is_held { &trusting } else { study };
     // What is left to do for a partial answer is done as for a quick look, without a share: that takes longest.
     let hurried = DiagnoseSettings {
         quick: true,
@@ -79,24 +79,16 @@ pub fn diagnose(
     })
 }
 
-/// Searches again with the start that the twin's code says, where a first row is another one and something is missing: what is missing may bend
-/// the reading of that start, as an offset does. `None` where listed effects do not explain the records so much better.
-fn trusted<'s>(
-    trusting: &'s Study,
-    (study, found): (&Study, &Search<Setup<'s>>),
+/// Returns whether a first row is not what the twin's code says, and something is missing.
+fn contradicts_start(
+    study: &Study,
+    found: &Search<Setup<'_>>,
     records: &[Record],
-    watch: Watch<'s>,
-) -> Result<Option<Search<Setup<'s>>>, StudyError> {
-    let known = &found.known;
-    let is_explained = known.log_z() - known.twin().log_z <= Thresholds::GAP;
-    let beliefs = watch.settings.beliefs(study);
-    let elsewhere = start_elsewhere(study.twin(), records, &beliefs);
-    if found.is_partial || is_explained || elsewhere.is_none() {
-        return Ok(None);
-    }
-    let other = searched(trusting, records, watch)?;
-    let least = known.listed_log_z() + STANDS;
-    Ok((other.known.listed_log_z() > least).then_some(other))
+    settings: &DiagnoseSettings,
+) -> bool {
+    let is_explained = found.known.log_z() - found.known.twin().log_z <= THRESHOLDS.gap;
+    let elsewhere = || start_elsewhere(study.twin(), records, &settings.beliefs(study));
+    !found.is_partial && !is_explained && elsewhere().is_some()
 }
 
 impl Study {

@@ -1,10 +1,9 @@
 //! The step of a twin's own integrator, and its inputs between samples, as rivals of every gap: what a finer step or another rule for inputs
 //! explains, the system does not lack.
 
-use super::thresholds::Thresholds;
+use super::thresholds::THRESHOLDS;
 use crate::fit::other_hold;
 use crate::fit::problem::Problem;
-use crate::fit::reference::Reference;
 use crate::hypothesis::search::model::Model;
 use crate::likelihood::kalman::recoverable;
 use crate::study::StudyError;
@@ -93,7 +92,7 @@ pub(in crate::diagnose) fn other_step(
         }));
     }
     let theta = &model.fitted.theta;
-    let Some(reference) = recoverable(Reference::new(&model.problem, theta))?.flatten() else {
+    let Some(reference) = model.reference()? else {
         return Ok(None);
     };
     let problem = |step: OtherStep| -> Result<Option<Problem>, StudyError> {
@@ -108,7 +107,7 @@ pub(in crate::diagnose) fn other_step(
         Ok(filtered.map(|filtered| reference.direction(&filtered)))
     };
     let nats = |direction: &DVector<f64>| 0.5 * reference.own(direction);
-    let near = Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * explained);
+    let near = THRESHOLDS.step_shows.max(THRESHOLDS.fine_print * explained);
     let candidates = OtherStep::candidates(integrator, stepping);
     let Some((&last, cheaper)) = candidates.split_last() else {
         return Ok(None);
@@ -137,7 +136,7 @@ pub(in crate::diagnose) fn other_step(
         return Ok(None);
     };
     let gain = carried.log_evidence - own.log_evidence.max(model.log_evidence);
-    if gain <= Thresholds::STEP_WINS {
+    if gain <= THRESHOLDS.step_wins {
         return Ok(None);
     }
     // With less noise than the own step needs, an error of the finer one may show as well.
@@ -178,7 +177,7 @@ mod tests {
             let passes = Passes::default();
             let base = Base::new(&study, study.twin(), records.into(), &settings, &passes);
             let base = base.unwrap();
-            other_step(&base.model, (Thresholds::STEP_SHOWS, 0.0), true).unwrap()
+            other_step(&base.model, (THRESHOLDS.step_shows, 0.0), true).unwrap()
         };
         for seed in 0..3 {
             assert!(

@@ -1,133 +1,138 @@
-//! Tuning constants of a diagnosis, in one place.
+//! Tuning constants of a diagnosis, in one place; the price of a second effect.
 
-use crate::hypothesis::search;
-
-/// Tuning constants of a diagnosis: unit and reason of each.
-///
-/// Numerical tolerances, iterations of a fit and sizes of a search stand beside their use.
-pub(in crate::diagnose) struct Thresholds;
-
-/// Records and reports.
-impl Thresholds {
-    /// Effects in the report: those below are of no weight.
-    pub const REPORTED: usize = 12;
-    /// Nats of likelihood within which a listed effect with θ inside the prior absorbs a parameter gap.
-    pub const ABSORBS: f64 = 2.0;
+numbers! {
+    /// Tuning constants of a diagnosis: unit and reason of each.
+    ///
+    /// Numerical tolerances, iterations of a fit and sizes of a search stand beside their use.
+    pub(in crate::diagnose) const THRESHOLDS: Thresholds = {
+        // Records and reports.
+        /// Effects in the report: those below are of no weight.
+        reported: usize = 12,
+        /// Nats of likelihood within which a listed effect with θ inside the prior absorbs a parameter gap.
+        absorbs: f64 = 2.0,
+        // Maps of residuals: descriptions.
+        /// Standard deviations above white noise of a cell that stands out.
+        notable: f64 = 4.0,
+        /// Samples below which a cut has no statistic.
+        least_in_cut: f64 = 5.0,
+        /// Lags of a whole output, in samples.
+        lags: usize = 20,
+        /// Windows of a record in the map of time.
+        windows: usize = 8,
+        /// Bins of a variable, with equal numbers of samples, in the map of values.
+        bins: usize = 5,
+        /// Ends of the bins of lags, in samples: octaves.
+        lag_bins: [(usize, usize); 5] = [(1, 1), (2, 3), (4, 7), (8, 15), (16, 31)],
+        /// Ends of the bands, in cycles a sample: octaves.
+        bands: [f64; 7] = [0.0, 1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5],
+        // Extent.
+        /// Level of all intervals.
+        interval_level: f64 = 0.9,
+        /// Horizons of predictions in samples, up to a tenth of the record.
+        horizons: [usize; 6] = [1, 3, 10, 30, 100, 300],
+        /// Standard deviations of the floor that the twin's error on simulated records lies above it, for a share to be measured: 1/CLEAR is the
+        /// standard deviation of a true system's share.
+        clear: f64 = 3.0,
+        /// Widest interval of a share beside which one number is told. Of 150 shares of true effects 85 % lie in −0.1 to 1.1; of 92 with an
+        /// interval narrower than 0.25 98 %, of 113 at 0.5 96 %, of 130 at 1 94 %.
+        widest: f64 = 0.5,
+        /// Effects drawn at random, fitted alike, as a control.
+        random_effects: usize = 5,
+        /// Records simulated for the floor.
+        floor_records: u64 = 32,
+        /// Records simulated for the interval of a share: its ends are the fifth of each side.
+        share_records: u64 = 100,
+        /// Nats that a term must gain in likelihood to be seen: its share of the prior and what its size is averaged over.
+        seen: f64 = 7.0,
+        /// Normal quantile of 80 %: the power that a visible magnitude has.
+        power_quantile: f64 = 0.8416,
+        /// Rivals that a next input is to tell apart.
+        most_rivals: usize = 3,
+        /// Simulations of each proposal.
+        proofs: u64 = 20,
+        /// Lengths of proposals, in multiples of the record.
+        lengths: [usize; 2] = [1, 3],
+        /// Parts of a record for which a level is held.
+        holds: [usize; 4] = [80, 27, 10, 4],
+        /// Levels of a staircase.
+        stairs: usize = 8,
+        // Predictive check.
+        /// Level of the check: a right twin is refused in one of a hundred records. At twice, false alarms take half of what the whole
+        /// diagnosis is allowed.
+        check_level: f64 = 0.01,
+        /// Records simulated at first: enough for means and deviations.
+        check_first: usize = 24,
+        /// Records simulated in all, where few of the first are as far off as the measured ones: the fewest whose smallest p is below the level.
+        check_records: usize = 120,
+        /// Share of the output's variance from which noise that was not declared is called a gap: a twin that leaves a quarter to it predicts
+        /// badly. At half of it, records with coloured noise of the declared variance are called; at twice, a pump that stops at random is not.
+        swallowed: f64 = 0.25,
+        /// Standard deviations of its declaration from which a noise level is beyond it.
+        beyond_declared: f64 = 3.0,
+        /// Simulated records as far off at which the check has passed.
+        check_enough: f64 = 3.5,
+        // Decision, in nats.
+        /// log of the odds that something is missing from which a gap is told: 20 to 1, since prior odds are even and a false alarm in
+        /// twenty is the most. At 2, three of 21 open trials without a gap are called instead of two, and three of 22 gaps more, all below 7
+        /// nats; at 4, two more are lost.
+        gap: f64 = 3.0,
+        /// Nats by which a finer step must move the innovations, θ free to answer, to be fitted at all: less is hardly 2 nats of evidence.
+        step_shows: f64 = 1.0,
+        /// Evidence from which a finer step becomes that of the twin: 7 to 1, as the user is then asked to change the study.
+        step_wins: f64 = 2.0,
+        /// Evidence from which noise of another kind becomes the noise of the twin: 20 to 1.
+        noise: f64 = 3.0,
+        /// Prior share of listed effects among what could be missing; the rest belongs to unknown functions. At 0.4 or 0.8 evidence moves by 0.4.
+        listed: f64 = 0.6,
+        /// Most that an unknown function may add on top of effects that explain everything.
+        adequate: f64 = 4.0,
+        /// Share of the whole evidence that may be left as well, and that a second effect has to add beside its prior: integrators and
+        /// discretisation differ by as much. On 12 open pairs that add more than 10 nats each, 10 are named; with a share of 0.1 for a second
+        /// effect 5, with none 10.
+        fine_print: f64 = 0.02,
+        /// Most of the twin's free-run error that may be left with an effect of a black box's signals.
+        nearer: f64 = 0.95,
+        /// Least probability of a name, or of rivals together.
+        said: f64 = 0.5,
+        /// Distance within which effects are rivals.
+        rivals: f64 = 3.0,
+        /// Prior probability that something else is missing beside a listed effect, shared among listed effects and unknown functions as what
+        /// is missing alone is. At half or twice, pairs cost 0.7 nats more or less.
+        second: f64 = 0.15,
+        /// Largest share of the whole that may remain beside a partial explanation.
+        rest: f64 = 0.34,
+        /// Share of its evidence by which an unknown function alone may be better than a partial explanation that others imitate. At half, the
+        /// lag of a real heater is not named; without it, three of 24 closed records of a law outside the library get a name more.
+        outdone: f64 = 0.15,
+        /// Evidence from which functions are drawn over the states of the corrected twin, too.
+        wider: f64 = 5.0,
+        /// Pairs that are kept.
+        pairs: usize = 6,
+    }
 }
 
-/// Maps of residuals: descriptions.
-impl Thresholds {
-    /// Standard deviations above white noise of a cell that stands out.
-    pub const NOTABLE: f64 = 4.0;
-    /// Samples below which a cut has no statistic.
-    pub const LEAST_IN_CUT: f64 = 5.0;
-    /// Lags of a whole output, in samples.
-    pub const LAGS: usize = 20;
-    /// Windows of a record in the map of time.
-    pub const WINDOWS: usize = 8;
-    /// Bins of a variable, with equal numbers of samples, in the map of values.
-    pub const BINS: usize = 5;
-    /// Ends of the bins of lags, in samples: octaves.
-    pub const LAG_BINS: [(usize, usize); 5] = [(1, 1), (2, 3), (4, 7), (8, 15), (16, 31)];
-    /// Ends of the bands, in cycles a sample: octaves.
-    pub const BANDS: [f64; 7] = [0.0, 1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5];
+/// Nats that each effect beside the first one costs.
+#[derive(Clone, Copy)]
+pub(in crate::diagnose) struct Price {
+    /// −log of the prior probability that a pair is what is missing, over that of one effect.
+    pub prior: f64,
+    /// A share of what the first law explains: integrators and discretisation differ by as much.
+    pub fine_print: f64,
 }
 
-/// Extent.
-impl Thresholds {
-    /// Level of all intervals.
-    pub const INTERVAL_LEVEL: f64 = 0.9;
-    /// Horizons of predictions in samples, up to a tenth of the record.
-    pub const HORIZONS: [usize; 6] = [1, 3, 10, 30, 100, 300];
-    /// Standard deviations of the floor that the twin's error on simulated records lies above it, for a share to be measured: 1/CLEAR is the
-    /// standard deviation of a true system's share.
-    pub const CLEAR: f64 = 3.0;
-    /// Widest interval of a share beside which one number is told. Of 150 shares of true effects 85 % lie in −0.1 to 1.1; of 92 with an
-    /// interval narrower than 0.25 98 %, of 113 at 0.5 96 %, of 130 at 1 94 %.
-    pub const WIDEST: f64 = 0.5;
-    /// Effects drawn at random, fitted alike, as a control.
-    pub const RANDOM_EFFECTS: usize = 5;
-    /// Records simulated for the floor.
-    pub const FLOOR_RECORDS: u64 = 32;
-    /// Records simulated for the interval of a share: its ends are the fifth of each side.
-    pub const SHARE_RECORDS: u64 = 100;
-    /// Nats that a term must gain in likelihood to be seen: its share of the prior and what its size is averaged over.
-    pub const SEEN: f64 = 7.0;
-    /// Normal quantile of 80 %: the power that a visible magnitude has.
-    pub const POWER_QUANTILE: f64 = 0.8416;
-    /// Rivals that a next input is to tell apart.
-    pub const MOST_RIVALS: usize = 3;
-    /// Simulations of each proposal.
-    pub const PROOFS: u64 = 20;
-    /// Lengths of proposals, in multiples of the record.
-    pub const LENGTHS: [usize; 2] = [1, 3];
-    /// Parts of a record for which a level is held.
-    pub const HOLDS: [usize; 4] = [80, 27, 10, 4];
-    /// Levels of a staircase.
-    pub const STAIRS: usize = 8;
-}
+impl Price {
+    /// The price among so many listed effects, of which the best alone explains `top` nats.
+    pub fn new(listed: usize, top: f64) -> Self {
+        let pairs = 0.5 * (listed as f64 - 1.0);
+        let second = THRESHOLDS.second * THRESHOLDS.listed / pairs.max(1.0);
+        Self {
+            prior: -second.ln(),
+            fine_print: THRESHOLDS.fine_print * top.max(0.0),
+        }
+    }
 
-/// Predictive check.
-impl Thresholds {
-    /// Level of the check: a right twin is refused in one of a hundred records. At twice, false alarms take half of what the whole
-    /// diagnosis is allowed.
-    pub const CHECK_LEVEL: f64 = 0.01;
-    /// Records simulated at first: enough for means and deviations.
-    pub const CHECK_FIRST: usize = 24;
-    /// Records simulated in all, where few of the first are as far off as the measured ones: the fewest whose smallest p is below the level.
-    pub const CHECK_RECORDS: usize = 120;
-    /// Share of the output's variance from which noise that was not declared is called a gap: a twin that leaves a quarter to it predicts
-    /// badly. At half of it, records with coloured noise of the declared variance are called; at twice, a pump that stops at random is not.
-    pub const SWALLOWED: f64 = 0.25;
-    /// Standard deviations of its declaration from which a noise level is beyond it.
-    pub const BEYOND_DECLARED: f64 = 3.0;
-    /// Simulated records as far off at which the check has passed.
-    pub const CHECK_ENOUGH: f64 = 3.5;
-}
-
-/// Decision, in nats.
-impl Thresholds {
-    /// log of the odds that something is missing from which a gap is told: 20 to 1, since prior odds are even and a false alarm in
-    /// twenty is the most. At 2, three of 21 open trials without a gap are called instead of two, and three of 22 gaps more, all below 7
-    /// nats; at 4, two more are lost.
-    pub const GAP: f64 = 3.0;
-    /// Nats by which a finer step must move the innovations, θ free to answer, to be fitted at all: less is hardly 2 nats of evidence.
-    pub const STEP_SHOWS: f64 = 1.0;
-    /// Evidence from which a finer step becomes that of the twin: 7 to 1, as the user is then asked to change the study.
-    pub const STEP_WINS: f64 = 2.0;
-    /// Evidence by which a fit of the twin from the θ of an explanation must be better than its own to count: fits end where they
-    /// promise a hundredth of it.
-    pub const BETTER: f64 = search::BETTER;
-    /// Evidence from which noise of another kind becomes the noise of the twin: 20 to 1.
-    pub const NOISE: f64 = 3.0;
-    /// Prior share of listed effects among what could be missing; the rest belongs to unknown functions. At 0.4 or 0.8 evidence moves by 0.4.
-    pub const LISTED: f64 = 0.6;
-    /// Most that an unknown function may add on top of effects that explain everything.
-    pub const ADEQUATE: f64 = 4.0;
-    /// Share of the whole evidence that may be left as well, and that a second effect has to add beside its prior: integrators and
-    /// discretisation differ by as much. On 12 open pairs that add more than 10 nats each, 10 are named; with a share of 0.1 for a second
-    /// effect 5, with none 10.
-    pub const FINE_PRINT: f64 = 0.02;
-    /// Distance to the best within which a single effect may still be the explanation.
-    pub const CANDIDATES: f64 = search::CANDIDATES;
-    /// Most of the twin's free-run error that may be left with an effect of a black box's signals.
-    pub const NEARER: f64 = 0.95;
-    /// Least probability of a name, or of rivals together.
-    pub const SAID: f64 = 0.5;
-    /// Distance within which effects are rivals.
-    pub const RIVALS: f64 = 3.0;
-    /// Prior probability that something else is missing beside a listed effect, shared among listed effects and unknown functions as what
-    /// is missing alone is. At half or twice, pairs cost 0.7 nats more or less.
-    pub const SECOND: f64 = 0.15;
-    /// Largest share of the whole that may remain beside a partial explanation.
-    pub const REST: f64 = 0.34;
-    /// Share of its evidence by which an unknown function alone may be better than a partial explanation that others imitate. At half, the
-    /// lag of a real heater is not named; without it, three of 24 closed records of a law outside the library get a name more.
-    pub const OUTDONE: f64 = 0.15;
-    /// Evidence up to which few hypotheses are refitted: nothing seems to be missing.
-    pub const NULL_LIKE: f64 = search::NULL_LIKE;
-    /// Evidence from which functions are drawn over the states of the corrected twin, too.
-    pub const WIDER: f64 = 5.0;
-    /// Pairs that are kept.
-    pub const PAIRS: usize = 6;
+    /// The price of so many effects together.
+    pub fn of(self, count: usize) -> f64 {
+        (self.fine_print + self.prior) * (count - 1) as f64
+    }
 }

@@ -5,7 +5,7 @@ use super::outcome::Shrinkage;
 use super::quantify::share::{Measures, shrinkage};
 use super::settings::DiagnoseSettings;
 use super::step::other_step;
-use super::thresholds::Thresholds;
+use super::thresholds::THRESHOLDS;
 use crate::fit::Passes;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::search::{Before, Breadth, listed};
@@ -45,7 +45,7 @@ pub(crate) fn true_fit(
     let Some(mut found) = fit(study.twin(), settings)? else {
         return Ok(None);
     };
-    if let Some((step, _)) = other_step(&found.1, (Thresholds::STEP_SHOWS, 0.0), study.asks_hold())?
+    if let Some((step, _)) = other_step(&found.1, (THRESHOLDS.step_shows, 0.0), study.asks_hold())?
         && let Some(finer) = step.of(study.twin())
     {
         let begin = DiagnoseSettings {

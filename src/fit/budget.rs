@@ -6,139 +6,152 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Iterations of each search: loud noise has a way to go.
 pub(crate) const ITERATIONS: usize = 80;
 
-/// Budget of a fit.
-#[derive(Debug)]
-pub(super) struct FitBudget {
-    /// Nats to the best within which a search is carried on.
-    pub near: f64,
-    /// Gain in nats at which it then ends.
-    pub polished_gain: f64,
-    /// Random points whose likelihood is looked at with loud noise: its wide valleys are met by few.
-    pub loud_points: u64,
-    /// The same with quiet noise, for each free entry.
-    pub quiet_points: u64,
-    /// Entries that such points are taken for, at most.
-    pub quiet_entries: usize,
-    /// Points of either that become starts.
-    pub screened_starts: usize,
-    /// Deviations of the prior between two starts that lie apart: nearer ones are mostly of one valley.
-    pub starts_apart: f64,
-    /// Nats within which two searches have found the same top.
-    pub same_top: f64,
-    /// Times that other starts are tried while only one search ends at the best top.
-    pub more_starts: u64,
-    /// Simplex searches one after another where a climb ends at a kink, at most; their steps for each entry, and the standard deviation of the
-    /// simplex's values in nats at which one ends.
-    pub kink_rounds: usize,
-    pub simplex_steps: u64,
-    pub simplex_end: f64,
-    /// Distance from the top that counts as arrived, in standard deviations: what is left to gain is its square's half, 0.02 nats.
-    pub arrived: f64,
-    /// The same where three searches, or most of them, end at one top: dry friction and thresholds make kinks, and at a kink no gradient vanishes.
-    pub agreed: f64,
-    /// Searches from points of the prior in a round.
-    pub restarts: u64,
-    /// Rounds of them at most.
-    pub restart_rounds: u64,
-    /// Gain in nats by which a restart shows that the searches had not arrived.
-    pub restart_gain: f64,
-    /// Nats by which a fit with effects may end below one without, since the priors of the effects count, too.
-    pub below_without: f64,
-    /// Searches from posterior draws that are better than the best fit, at most.
-    pub restarts_from_draws: usize,
-    /// Shares of the records that a black box is fitted to before the whole of them.
-    pub grown_shares: [f64; 2],
-    /// Best fits that go on to the next share.
-    pub grown_kept: usize,
-    /// Random points whose likelihood is looked at over the first share.
-    pub grown_points: u64,
-    /// Points of these that become starts.
-    pub grown_starts: usize,
-    /// Trial points of a search of a black box, at most.
-    pub grown_iterations: usize,
-    /// Samples that are filtered in a round of posterior draws.
-    pub round_samples: usize,
-    /// Draws that makes at least.
-    pub least_draws: usize,
-    /// Draws that makes at most.
-    pub most_draws: usize,
-    /// Draws of the last round for each that is asked for: weights are uneven, and fewer would repeat draws.
-    pub draws_each: usize,
-    /// Rounds of adaptation where draws are asked for; without, one.
-    pub adaptations: usize,
-    /// Share of the first proposals' covariance in those that follow their draws.
-    pub kept_covariance: f64,
-    /// Nats below the best top within which another counts: a mode with a thousandth of the mass is none.
-    pub counting_top: f64,
-    /// Standard deviations between two tops of their own.
-    pub tops_apart: f64,
-    /// Gain in nats at which a draw is better than the fit.
-    pub better_draw: f64,
-    /// Draws that count, for each entry of φ: weights are flattened until so many do, so that a proposal follows more than a few draws.
-    pub counting_draws: f64,
-    /// Different posterior draws that intervals need: three of them lie beyond an end at 0.9.
-    pub interval_draws: usize,
-    /// Draws for each parameter that a covariance needs.
-    pub region_draws: usize,
-    /// Samples that are filtered in a round of draws for the evidence.
-    pub evidence_samples: usize,
-    /// Draws that makes at least.
-    pub least_evidence_draws: usize,
-    /// Draws that makes at most.
-    pub most_evidence_draws: usize,
-    /// Monte-Carlo error of the evidence in nats that is small enough.
-    pub evidence_error: f64,
-    /// Rounds for which more draws are taken, at most.
-    pub evidence_rounds: usize,
-    /// Effective draws below which these say less of the evidence than Laplace.
-    pub effective_draws: f64,
+numbers! {
+    /// Budget of a fit.
+    pub(super) const BUDGET: FitBudget = {
+        /// Nats to the best within which a search is carried on.
+        near: f64 = 3.0,
+        /// Gain in nats at which it then ends.
+        polished_gain: f64 = 1e-4,
+        /// Random points whose likelihood is looked at with loud noise: its wide valleys are met by few.
+        loud_points: u64 = 48,
+        /// The same with quiet noise, for each free entry.
+        quiet_points: u64 = 64,
+        /// Entries that such points are taken for, at most.
+        quiet_entries: usize = 8,
+        /// Points of either that become starts.
+        screened_starts: usize = 3,
+        /// Deviations of the prior between two starts that lie apart: nearer ones are mostly of one valley.
+        starts_apart: f64 = 1.0,
+        /// Nats within which two searches have found the same top.
+        same_top: f64 = 0.1,
+        /// Times that other starts are tried while only one search ends at the best top.
+        more_starts: u64 = 3,
+        /// Simplex searches one after another where a climb ends at a kink, at most; their steps for each entry, and the standard deviation of the
+        /// simplex's values in nats at which one ends.
+        kink_rounds: usize = 4,
+        simplex_steps: u64 = 40,
+        simplex_end: f64 = 0.02,
+        /// Distance from the top that counts as arrived, in standard deviations: what is left to gain is its square's half, 0.02 nats.
+        arrived: f64 = 0.2,
+        /// The same where three searches, or most of them, end at one top: dry friction and thresholds make kinks, and at a kink no gradient vanishes.
+        agreed: f64 = 1.0,
+        /// Searches from points of the prior in a round.
+        restarts: u64 = 3,
+        /// Rounds of them at most.
+        restart_rounds: u64 = 3,
+        /// Gain in nats by which a restart shows that the searches had not arrived.
+        restart_gain: f64 = 0.5,
+        /// Nats by which a fit with effects may end below one without, since the priors of the effects count, too.
+        below_without: f64 = 0.5,
+        /// Searches from posterior draws that are better than the best fit, at most.
+        restarts_from_draws: usize = 6,
+        /// Shares of the records that a black box is fitted to before the whole of them.
+        grown_shares: [f64; 2] = [0.25, 0.5],
+        /// Best fits that go on to the next share.
+        grown_kept: usize = 2,
+        /// Random points whose likelihood is looked at over the first share.
+        grown_points: u64 = 32,
+        /// Points of these that become starts.
+        grown_starts: usize = 4,
+        /// Trial points of a search of a black box, at most.
+        grown_iterations: usize = 25,
+        /// Samples that are filtered in a round of posterior draws.
+        round_samples: usize = 200_000,
+        /// Draws that makes at least.
+        least_draws: usize = 100,
+        /// Draws that makes at most.
+        most_draws: usize = 500,
+        /// Draws of the last round for each that is asked for: weights are uneven, and fewer would repeat draws.
+        draws_each: usize = 4,
+        /// Rounds of adaptation where draws are asked for; without, one.
+        adaptations: usize = 3,
+        /// Share of the first proposals' covariance in those that follow their draws.
+        kept_covariance: f64 = 0.05,
+        /// Nats below the best top within which another counts: a mode with a thousandth of the mass is none.
+        counting_top: f64 = 7.0,
+        /// Standard deviations between two tops of their own.
+        tops_apart: f64 = 3.0,
+        /// Gain in nats at which a draw is better than the fit.
+        better_draw: f64 = 0.1,
+        /// Draws that count, for each entry of φ: weights are flattened until so many do, so that a proposal follows more than a few draws.
+        counting_draws: f64 = 4.0,
+        /// Different posterior draws that intervals need: three of them lie beyond an end at 0.9.
+        interval_draws: usize = 60,
+        /// Draws for each parameter that a covariance needs.
+        region_draws: usize = 10,
+        /// Samples that are filtered in a round of draws for the evidence.
+        evidence_samples: usize = 400_000,
+        /// Draws that makes at least.
+        least_evidence_draws: usize = 200,
+        /// Draws that makes at most.
+        most_evidence_draws: usize = 1000,
+        /// Monte-Carlo error of the evidence in nats that is small enough.
+        evidence_error: f64 = 0.03,
+        /// Rounds for which more draws are taken, at most.
+        evidence_rounds: usize = 4,
+        /// Effective draws below which these say less of the evidence than Laplace.
+        effective_draws: f64 = 30.0,
+        /// Damping of the first step, and the least one: far from the top the information is often too small.
+        first_damping: f64 = 0.1,
+        least_damping: f64 = 1e-6,
+        /// Largest entry of a step in φ that is not worth a pass.
+        least_step: f64 = 1e-9,
+        /// Damping beyond which no step helps.
+        most_damping: f64 = 1e5,
+        /// Damping after the first rejected step, at least.
+        rejected_damping: f64 = 1e-3,
+        /// Steps may be so many times the longest of an entry where entries answer each other.
+        longer_steps: f64 = 2.0,
+        /// A step that promises less than this share of the gain at which a search ends is not tried.
+        least_promise: f64 = 0.2,
+        /// Share of the variance of a free run's error that must go with the process noise before a fit speaks of it. A quarter of it is seen beside
+        /// twins that lack a little, too; of twice as much, nothing would be left.
+        swallowed: f64 = 0.5,
+        /// Nats by which a rule must move the innovations, θ free to answer, to be fitted at all: less is hardly 2 nats of a gain.
+        hold_shows: f64 = 1.0,
+        /// Nats from which another rule becomes that of the twin: 20 to 1, as the user is then asked to change the study. Twice asks two records in a
+        /// hundred fewer whose inputs are sampled; half takes noise for a rule in one of twenty.
+        hold_wins: f64 = 3.0,
+        /// Factor to a fine step from any: the error of a fourth-order rule falls to a 256th, as that of Euler's does with its square nearly. Twice
+        /// costs twice the passes; half leaves a sixteenth, which may still decide.
+        finer_step: usize = 4,
+        /// A direction that θ imitates up to this share of its square is no direction of its own.
+        collinear: f64 = 1e-3,
+        /// Pull of the prior on a value, in standard errors, from which its interval is the profile's. At a quarter an interval of 90 % about the pulled
+        /// value misses the truth 11 times in 100; at a half 14 times, at one 26 times.
+        pull: f64 = 0.25,
+        /// Variance over that without the prior, from which down it is as well: the prior then makes an interval 5 % narrower than the records do; at half
+        /// that, 2.5 %.
+        narrowed: f64 = 0.9,
+        /// Information that directions have of which the records say nothing, as a share of that with the prior.
+        no_information: f64 = 1e-6,
+        /// Parts of the way to the end of the interval, in √(max ℓ − ℓ), that a step should make.
+        profile_parts: f64 = 3.0,
+        /// Fits on a side, at most: steps double, so that with half of them a parameter that is not identified ends early at a thousand errors.
+        most_profile_fits: usize = 20,
+        /// Points on a side, at least: a curve of fewer has corners.
+        least_profile_points: usize = 6,
+        /// Secants to an end, at most, and the error of √(max ℓ − ℓ) that is small enough: a hundredth of a standard error.
+        secants: usize = 4,
+        profile_error: f64 = 0.007,
+        /// Length of an axis over the longest at which it is none: a start that is known, say.
+        least_axis: f64 = 1e-9,
+        /// Share of the draws that a top must have for the region to hold it: a 90 % interval misses a tenth. Tops along one ridge share it, and
+        /// the best of them may have little of it; a far top of less mass would make the region larger than what the records leave open.
+        least_share: f64 = 0.05,
+        /// Points over bounds and prior whose eigenvalues are looked at: no pass of a filter.
+        spectral_points: u64 = 512,
+        /// Points that become starts.
+        spectral_starts: usize = 2,
+        /// Largest damping ratio of a pole that swings: beyond, it shows less than one cycle.
+        damped: f64 = 0.6,
+        /// Fastest swing that is told, in parts of half the sampling rate.
+        fastest: f64 = 0.8,
+        /// Ridge of the regression, as a share of its mean square.
+        spectral_ridge: f64 = 1e-9,
+    }
 }
-
-/// The budget of every fit; benches of records with known tops stand behind it.
-pub(super) const BUDGET: FitBudget = FitBudget {
-    near: 3.0,
-    polished_gain: 1e-4,
-    loud_points: 48,
-    quiet_points: 64,
-    quiet_entries: 8,
-    screened_starts: 3,
-    starts_apart: 1.0,
-    same_top: 0.1,
-    more_starts: 3,
-    kink_rounds: 4,
-    simplex_steps: 40,
-    simplex_end: 0.02,
-    arrived: 0.2,
-    agreed: 1.0,
-    restarts: 3,
-    restart_rounds: 3,
-    restart_gain: 0.5,
-    below_without: 0.5,
-    restarts_from_draws: 6,
-    grown_shares: [0.25, 0.5],
-    grown_kept: 2,
-    grown_points: 32,
-    grown_starts: 4,
-    grown_iterations: 25,
-    round_samples: 200_000,
-    least_draws: 100,
-    most_draws: 500,
-    draws_each: 4,
-    adaptations: 3,
-    kept_covariance: 0.05,
-    counting_top: 7.0,
-    tops_apart: 3.0,
-    better_draw: 0.1,
-    counting_draws: 4.0,
-    interval_draws: 60,
-    region_draws: 10,
-    evidence_samples: 400_000,
-    least_evidence_draws: 200,
-    most_evidence_draws: 1000,
-    evidence_error: 0.03,
-    evidence_rounds: 4,
-    effective_draws: 30.0,
-};
 
 /// Passes over a record, of a filter or of an ensemble of simulations, with or without derivatives. Clones share the count.
 #[derive(Clone, Default)]

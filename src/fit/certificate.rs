@@ -5,18 +5,7 @@ use super::problem::Problem;
 use super::starts::{agreeing, climbs, polish, sort};
 use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
-use crate::twin::Noise;
-
-/// Side of a bound.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Side {
-    /// Lower bound.
-    Low,
-    /// Upper bound.
-    High,
-}
+use crate::twin::{Noise, Side};
 
 /// End of a fit.
 #[derive(Debug, Clone, PartialEq)]

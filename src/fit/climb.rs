@@ -3,18 +3,13 @@
 //! With equations, the filter's score gives gradient and information. Without, differences do: innovations and covariances a step beside θ,
 //! of the same draws, give the directions D; for Gaussian innovations the gradient is D·r and the information DᵀD, as in `reference.rs`.
 
+use crate::fit::budget::BUDGET;
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::fit::solver::{LocalModel, Objective, Solver};
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-
-/// Damping of the first step, and the least one: far from the top the information is often too small.
-const DAMPING: f64 = 0.1;
-const LEAST_DAMPING: f64 = 1e-6;
-/// Largest entry of a step in φ that is not worth a pass.
-const LEAST_STEP: f64 = 1e-9;
 
 /// Result of a fit.
 #[derive(Debug, Clone)]
@@ -59,11 +54,11 @@ pub(crate) fn climb(
         held: problem.axes.iter().map(|axis| axis.held).collect(),
         iterations: iterations as u64,
         trials: 1,
-        damping: DAMPING,
-        least_damping: LEAST_DAMPING,
+        damping: BUDGET.first_damping,
+        least_damping: BUDGET.least_damping,
         gain: problem.done(),
         relative_gain: 0.0,
-        least_step: LEAST_STEP,
+        least_step: BUDGET.least_step,
         models_end: true,
     };
     let start = DVector::from_vec(c.of(&problem.clamp(start)));

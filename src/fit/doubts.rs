@@ -1,6 +1,5 @@
 //! Reasons to doubt a result: one list for `fit`, `estimate` and `diagnose`, one wording each.
 
-use super::certificate::Side;
 use super::follow::Swallowed;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
@@ -9,7 +8,7 @@ use crate::math::{is_constant, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
 use crate::setting::number;
 use crate::twin::conformance::coarse_step;
-use crate::twin::{Hold, Stepping, Twin};
+use crate::twin::{Hold, Side, Stepping, Twin};
 use std::collections::BTreeMap;
 
 /// Code of a free run that diverges.
@@ -100,9 +99,9 @@ impl Warning {
         }
     }
 
-    /// A value that lies at a bound: `low` or `high`.
-    pub(crate) fn at_bound(code: &'static str, what: &str, side: &str) -> Self {
-        let side = if side == "low" { "lower" } else { "upper" };
+    /// A value that lies at a bound.
+    pub(crate) fn at_bound(code: &'static str, what: &str, side: Side) -> Self {
+        let side = if side == Side::Low { "lower" } else { "upper" };
         Self::new(code, format!("{what} lies at its {side} bound"))
     }
 
@@ -249,13 +248,9 @@ impl<'a> Doubts<'a> {
         noise: &[FittedNoise],
         off: &BTreeMap<String, f64>,
     ) {
-        let id = |side: Side| match side {
-            Side::Low => "low",
-            Side::High => "high",
-        };
         for p in parameters {
             let Some(side) = p.at_bound else { continue };
-            let mut doubt = Warning::at_bound("at-bound", &p.name, id(side));
+            let mut doubt = Warning::at_bound("at-bound", &p.name, side);
             if off.get(&p.name) == Some(&p.value) {
                 doubt.what = format!("{} lies where the effect is off", p.name);
                 doubt.remedy = "leave the effect out: the record does not ask for it";
@@ -270,7 +265,7 @@ impl<'a> Doubts<'a> {
             }
             let what = format!("the {} noise of {}", level.role, level.name);
             self.all
-                .push(Warning::at_bound("noise-at-bound", &what, id(side)));
+                .push(Warning::at_bound("noise-at-bound", &what, side));
         }
     }
 

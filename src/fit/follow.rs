@@ -3,6 +3,7 @@
 use super::climb::{Fitted, fit};
 use super::outcome::{FittedStart, OutputErrors};
 use super::problem::Problem;
+use crate::fit::budget::BUDGET;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::Level;
 use crate::likelihood::kalman::{FilterError, States, recoverable};
@@ -146,10 +147,6 @@ impl LagOne {
     }
 }
 
-/// Share of the variance of a free run's error that must go with the process noise before a fit speaks of it. A quarter of it is seen beside
-/// twins that lack a little, too; of twice as much, nothing would be left.
-const SWALLOWED: f64 = 0.5;
-
 /// An output that the twin follows much better if it is fitted without process noise.
 pub(super) struct Swallowed {
     pub name: String,
@@ -174,7 +171,7 @@ pub(super) fn swallowed(
     };
     let loses = |e: &OutputErrors| {
         let free = e.free_run.unwrap_or(f64::INFINITY);
-        e.one_step.powi(2) < (1.0 - SWALLOWED) * free.powi(2)
+        e.one_step.powi(2) < (1.0 - BUDGET.swallowed) * free.powi(2)
     };
     if !space.iter().any(|p| is_free(&p.name)) || !fitted_errors.iter().any(loses) {
         return Ok(None);
@@ -200,7 +197,7 @@ pub(super) fn swallowed(
     };
     let all = (fitted_errors.iter().zip(alone)).filter_map(|(own, alone)| {
         let (with, without) = (own.free_run?, alone.free_run?);
-        let is_better = without.powi(2) < (1.0 - SWALLOWED) * with.powi(2);
+        let is_better = without.powi(2) < (1.0 - BUDGET.swallowed) * with.powi(2);
         is_better.then(|| Swallowed {
             name: own.name.clone(),
             with,

@@ -5,19 +5,11 @@
 use super::climb::{Fitted, climb};
 use super::problem::Problem;
 use super::reference::Reference;
+use crate::fit::budget::BUDGET;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
 use crate::record::Drive;
 use crate::twin::{Hold, Integrator, MOST_SUBSTEPS, Stepping};
-
-/// Nats by which a rule must move the innovations, θ free to answer, to be fitted at all: less is hardly 2 nats of a gain.
-const SHOWS: f64 = 1.0;
-/// Nats from which another rule becomes that of the twin: 20 to 1, as the user is then asked to change the study. Twice asks two records in a
-/// hundred fewer whose inputs are sampled; half takes noise for a rule in one of twenty.
-const WINS: f64 = 3.0;
-/// Factor to a fine step from any: the error of a fourth-order rule falls to a 256th, as that of Euler's does with its square nearly. Twice
-/// costs twice the passes; half leaves a sixteenth, which may still decide.
-const FINE: usize = 4;
 
 /// Another rule for inputs between samples, and the substeps beside it, with which a fit explains its records better.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +35,7 @@ pub(crate) fn other_hold(
         return Ok(None);
     }
     let theta = &fitted.theta;
-    let Some(reference) = recoverable(Reference::new(problem, theta))?.flatten() else {
+    let Some(reference) = Reference::new(problem, theta)? else {
         return Ok(None);
     };
     let mut shown = vec![];
@@ -53,7 +45,8 @@ pub(crate) fn other_hold(
             continue;
         };
         let filtered = recoverable(other.filtered(theta))?;
-        let shows = |f: &Vec<Filtered>| 0.5 * reference.own(&reference.direction(f)) > SHOWS;
+        let shows =
+            |f: &Vec<Filtered>| 0.5 * reference.own(&reference.direction(f)) > BUDGET.hold_shows;
         if filtered.as_ref().is_some_and(shows) {
             shown.push(hold);
         }
@@ -62,9 +55,9 @@ pub(crate) fn other_hold(
         return Ok(None);
     }
     let factor = match integrator {
-        Integrator::Euler => FINE * FINE,
+        Integrator::Euler => BUDGET.finer_step * BUDGET.finer_step,
         Integrator::Adaptive | Integrator::Stiff => 1,
-        _ => FINE,
+        _ => BUDGET.finer_step,
     };
     let substeps = (factor * own.substeps).min(MOST_SUBSTEPS);
     let carried = |hold: Hold| -> Result<Option<f64>, FilterError> {
@@ -81,7 +74,7 @@ pub(crate) fn other_hold(
     let mut best: Option<OtherHold> = None;
     for hold in shown {
         let gain = carried(hold)?.map_or(f64::NEG_INFINITY, |objective| objective - least);
-        if gain > best.map_or(WINS, |best| best.gain) {
+        if gain > best.map_or(BUDGET.hold_wins, |best| best.gain) {
             let stepping = Stepping {
                 substeps,
                 hold,

@@ -41,8 +41,8 @@ mod searched;
 mod solver;
 pub(crate) mod starts;
 
+pub use crate::twin::Side;
 pub(crate) use budget::{ITERATIONS, Passes};
-pub use certificate::Side;
 pub(crate) use hold::other_hold;
 pub(crate) use outcome::NOT_CONVERGED;
 pub use outcome::{

@@ -1,10 +1,9 @@
 //! Result of a fit.
 
-use super::certificate::Side;
 use super::posterior::{Posterior, PosteriorRegion};
 use super::profile::Profile;
 use crate::record::Signal;
-use crate::twin::{Noise, Role, Stepping, StepsTaken};
+use crate::twin::{Noise, Role, Side, Stepping, StepsTaken};
 use serde::Serialize;
 
 /// Settings of a fit.

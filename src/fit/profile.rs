@@ -13,6 +13,7 @@
 
 use super::climb::{Fitted, climb};
 use super::problem::Problem;
+use crate::fit::budget::BUDGET;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Role;
@@ -21,24 +22,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeSet;
-
-/// Pull of the prior on a value, in standard errors, from which its interval is the profile's. At a quarter an interval of 90 % about the pulled
-/// value misses the truth 11 times in 100; at a half 14 times, at one 26 times.
-const PULL: f64 = 0.25;
-/// Variance over that without the prior, from which down it is as well: the prior then makes an interval 5 % narrower than the records do; at half
-/// that, 2.5 %.
-const NARROWED: f64 = 0.9;
-/// Information that directions have of which the records say nothing, as a share of that with the prior.
-const NOTHING: f64 = 1e-6;
-/// Parts of the way to the end of the interval, in √(max ℓ − ℓ), that a step should make.
-const PARTS: f64 = 3.0;
-/// Fits on a side, at most: steps double, so that with half of them a parameter that is not identified ends early at a thousand errors.
-const MOST: usize = 20;
-/// Points on a side, at least: a curve of fewer has corners.
-const LEAST: usize = 6;
-/// Secants to an end, at most, and the error of √(max ℓ − ℓ) that is small enough: a hundredth of a standard error.
-const SECANTS: usize = 4;
-const CLOSE: f64 = 0.007;
 
 /// The likelihood along one parameter, all else at its best.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -119,7 +102,7 @@ fn shaped(problem: &Problem, fitted: &Fitted) -> Vec<usize> {
     for (a, &j) in free.iter().enumerate() {
         if entries.contains(&j) {
             let (centre, precision) = terms[j];
-            alone[(a, a)] -= (1.0 - NOTHING) * precision;
+            alone[(a, a)] -= (1.0 - BUDGET.no_information) * precision;
             pull[a] = precision * (phi[j] - centre);
         }
     }
@@ -133,7 +116,7 @@ fn shaped(problem: &Problem, fitted: &Fitted) -> Vec<usize> {
             return false;
         };
         let (own, wide) = (posterior[(a, a)], records[(a, a)]);
-        shift[a].abs() > PULL * own.sqrt() || own < NARROWED * wide
+        shift[a].abs() > BUDGET.pull * own.sqrt() || own < BUDGET.narrowed * wide
     });
     entries
 }
@@ -195,10 +178,11 @@ impl Profiled {
             c.lower()[j]
         };
         let usual = Some(self.errors[j]).filter(|e| e.is_finite() && *e > 0.0);
-        let mut step = usual.unwrap_or(self.problem.axes[j].longest) * (2.0 * depth).sqrt() / PARTS;
+        let mut step = usual.unwrap_or(self.problem.axes[j].longest) * (2.0 * depth).sqrt()
+            / BUDGET.profile_parts;
         let mut points: Vec<ProfilePoint> = vec![];
         let (mut before, mut here) = (start.clone(), start);
-        while points.len() < MOST && here[j] != bound {
+        while points.len() < BUDGET.most_profile_fits && here[j] != bound {
             let next = here[j] + sign * step;
             let next = if sign * (next - bound) >= 0.0 {
                 bound
@@ -209,7 +193,7 @@ impl Profiled {
                 break;
             };
             let last = points.last().map_or(0.0, ProfilePoint::root);
-            let rise = (point.root() - last) * PARTS / depth.sqrt();
+            let rise = (point.root() - last) * BUDGET.profile_parts / depth.sqrt();
             (before, here) = (here, point.phi.clone());
             let is_beyond = point.drop > depth;
             points.push(point);
@@ -231,7 +215,7 @@ impl Profiled {
         points: &mut Vec<ProfilePoint>,
     ) -> Result<(), FilterError> {
         let top = self.problem.coordinates.of(&self.top.theta);
-        while (1..LEAST).contains(&points.len()) {
+        while (1..BUDGET.least_profile_points).contains(&points.len()) {
             let before = |i: usize| if i == 0 { &top } else { &points[i - 1].phi };
             let gap = |i: &usize| (points[*i].phi[j] - before(*i)[j]).abs();
             let widest = (0..points.len()).max_by(|a, b| gap(a).total_cmp(&gap(b)));
@@ -254,9 +238,10 @@ impl Profiled {
         depth: f64,
     ) -> Result<(), FilterError> {
         let top = self.problem.coordinates.of(&self.top.theta);
-        for _ in 0..SECANTS {
+        for _ in 0..BUDGET.secants {
             let [inside, beyond] = around(points, &top);
-            let is_close = |point: &ProfilePoint| (point.root() - depth.sqrt()).abs() < CLOSE;
+            let is_close =
+                |point: &ProfilePoint| (point.root() - depth.sqrt()).abs() < BUDGET.profile_error;
             if is_close(&inside) || is_close(&beyond) {
                 break;
             }

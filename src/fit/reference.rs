@@ -10,13 +10,11 @@
 //! r·d is then the score and d·d the Fisher information of Gaussian innovations. With the directions D of θ projected out,
 //! gain = ½·(r·d⊥)²/(d⊥·d⊥), in nats. Δ is a secant to a point of a dictionary, so thresholds have one too.
 
+use crate::fit::budget::BUDGET;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
 use crate::math::nearest;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-
-/// A direction that θ imitates up to this share of its square is no direction of its own.
-const COLLINEAR: f64 = 1e-3;
 
 /// Innovations at θ̂, ready to be compared with.
 pub(crate) struct Reference {
@@ -42,7 +40,7 @@ pub(crate) struct Gain {
 }
 
 impl Reference {
-    /// Filters at θ, which is as free as the weak priors leave it.
+    /// Filters at θ, which is as free as the weak priors leave it; `None` where the filter does not work there.
     pub fn new(problem: &Problem, theta: &[f64]) -> Result<Option<Self>, FilterError> {
         Self::knowing(problem, theta, &weak(problem))
     }
@@ -53,7 +51,9 @@ impl Reference {
         theta: &[f64],
         known: &DMatrix<f64>,
     ) -> Result<Option<Self>, FilterError> {
-        let filtered = problem.filtered(theta)?;
+        let Some(filtered) = recoverable(problem.filtered(theta))? else {
+            return Ok(None);
+        };
         let mut beside = Vec::new();
         for (j, (moved, distance)) in problem.neighbours(theta).into_iter().enumerate() {
             if problem.axes[j].held {
@@ -194,7 +194,7 @@ impl Reference {
         let square = direction.norm_squared();
         let with_theta = self.directions.tr_mul(direction);
         let own = square - with_theta.dot(&self.factor.solve(&with_theta));
-        if own > COLLINEAR * square && own.is_finite() {
+        if own > BUDGET.collinear * square && own.is_finite() {
             own
         } else {
             0.0

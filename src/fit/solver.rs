@@ -12,21 +12,13 @@
 //!
 //! Source: Nocedal & Wright, *Numerical Optimization*, second edition, sections 10.3 and 16.7.
 
+use crate::fit::budget::BUDGET;
 use crate::math::{MathError, nearest};
 use argmin::core::{
     Executor, IterState, KV, Problem, Solver as ArgminSolver, State, TerminationReason,
     TerminationStatus,
 };
 use nalgebra::{DMatrix, DVector};
-
-/// Damping beyond which no step helps.
-const MOST_DAMPING: f64 = 1e5;
-/// Damping after the first rejected step, at least.
-const REJECTED_DAMPING: f64 = 1e-3;
-/// Steps may be so many times the longest of an entry where entries answer each other.
-const LONGER: f64 = 2.0;
-/// A step that promises less than this share of the gain at which a search ends is not tried.
-const PROMISE: f64 = 0.2;
 
 /// A cost and its derivatives: the operator that [`Solver`] asks.
 pub(super) trait Objective {
@@ -163,7 +155,7 @@ impl Solver<'_> {
         let mut shrink: f64 = 1.0;
         for (a, &j) in free.iter().enumerate() {
             step[j] = part[a];
-            shrink = shrink.min(LONGER * self.longest[j] / part[a].abs().max(1e-300));
+            shrink = shrink.min(BUDGET.longer_steps * self.longest[j] / part[a].abs().max(1e-300));
         }
         match step.iter().all(|v| v.is_finite()) {
             true => DampedStep::To(step * shrink),
@@ -173,8 +165,8 @@ impl Solver<'_> {
 
     /// More damping; `false` where it is of no use.
     fn damps_more(&mut self) -> bool {
-        self.damping = (8.0 * self.damping).max(REJECTED_DAMPING);
-        self.damping < MOST_DAMPING
+        self.damping = (8.0 * self.damping).max(BUDGET.rejected_damping);
+        self.damping < BUDGET.most_damping
     }
 
     /// The first of the trial points that lowers the cost.
@@ -197,7 +189,9 @@ impl Solver<'_> {
                 DampedStep::To(step) => {
                     let next = self.clamp(&(x + &step));
                     let moved = (&next - x).amax();
-                    if moved < self.least_step || -gradient.dot(&step) < PROMISE * enough {
+                    if moved < self.least_step
+                        || -gradient.dot(&step) < BUDGET.least_promise * enough
+                    {
                         return Ok(Trial::Ends(CONVERGED));
                     }
                     // The cost alone tells whether to go there; the derivatives follow if so.

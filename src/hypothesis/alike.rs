@@ -6,18 +6,14 @@
 use super::listed::Library;
 use super::term::{Nature, Part, Term, with_terms};
 use crate::effect::{EffectKey, TargetKind};
+use crate::hypothesis::limits::TERM;
 use crate::likelihood::kalman::FilterError;
-
-/// Moments of each record at which equations are compared: many more than a law that is not the same could agree at by chance.
-const MOMENTS: usize = 48;
-/// Largest share of a term's square that another one may not have: rounding makes 10⁻²⁰, and 10⁻³ would show at thousands of nats alone.
-const SAME: f64 = 1e-6;
 
 /// Merges terms that add the same to the equations, at small sizes and at the largest. The first by place (state, actuator, sensor,
 /// parameter), then by name, stands for the others. A black box shows no equations, and keeps all.
 pub(crate) fn merged(terms: Vec<Term>, library: &Library<'_>) -> Result<Vec<Term>, FilterError> {
     let (twin, theta) = (library.twin, library.theta);
-    let Some(own) = library.scales.equations_at(twin, theta, MOMENTS) else {
+    let Some(own) = library.scales.equations_at(twin, theta, TERM.moments) else {
         return Ok(terms);
     };
     let beside = Beside { library, own };
@@ -124,7 +120,7 @@ fn is_multiple(own: &[f64], multiple: f64, other: &[f64]) -> bool {
     let rest: f64 = (own.iter().zip(other))
         .map(|(own, other)| (own - multiple * other).powi(2))
         .sum();
-    own.len() == other.len() && rest <= SAME * dot(own, own)
+    own.len() == other.len() && rest <= TERM.same_square * dot(own, own)
 }
 
 /// A fitted twin, and its own equations along the records.
@@ -144,7 +140,7 @@ impl Beside<'_> {
         } = self.library;
         let twin = with_terms(twin, std::iter::once(term))?;
         let theta = [*theta, &[size]].concat();
-        let grown = (scales.equations_at(&twin, &theta, MOMENTS))
+        let grown = (scales.equations_at(&twin, &theta, TERM.moments))
             .filter(|grown| grown.len() == self.own.len())
             .unwrap_or_default();
         Ok(grown

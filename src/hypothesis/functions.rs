@@ -15,6 +15,7 @@ use super::term::{Nature, Part, Start, Term};
 use super::trace::{Trace, Trail};
 use crate::effect::{Effect, EffectKind, Magnitude, Shape, lag};
 use crate::fit::axis::{Axis, EvidencePrior};
+use crate::hypothesis::limits::TERM;
 use crate::math::quantile;
 use crate::twin::{Interval, Now, Parameter};
 use std::collections::BTreeMap;
@@ -23,13 +24,8 @@ use std::f64::consts::PI;
 /// Lengths in ranges of the variable.
 const LENGTHS: [f64; 3] = [0.15, 0.3, 0.7];
 const LENGTHS_OF_TWO: [f64; 2] = [0.3, 0.7];
-/// Share of the range by which a function's is wider at each end: its terms vanish at the ends.
-const MARGIN: f64 = 0.2;
 /// Time constants that a signal's past is seen through, in seconds, from a few steps to a part of the record.
 pub(super) const PASTS: usize = 4;
-
-/// Most states for which functions of any two are rivals; beyond, only those with the state's own value.
-pub(super) const MOST_STATES: usize = 4;
 
 /// Names of coefficients: effects name their magnitudes before any record is seen.
 static NAMES: [&str; 21] = [
@@ -51,7 +47,10 @@ impl Variable {
         let span = (self.high - self.low)
             .max(1e-12 * self.high.abs())
             .max(f64::MIN_POSITIVE);
-        (self.low - MARGIN * span, self.high + MARGIN * span)
+        (
+            self.low - TERM.margin * span,
+            self.high + TERM.margin * span,
+        )
     }
 }
 
@@ -72,7 +71,7 @@ pub(super) fn spread<const N: usize>(low: f64, high: f64) -> [f64; N] {
 
 /// Weights of the coefficients for each length.
 fn weights(variables: usize) -> Vec<Vec<f64>> {
-    let whole = 1.0 + 2.0 * MARGIN;
+    let whole = 1.0 + 2.0 * TERM.margin;
     let one = |squares: &dyn Fn(f64) -> Vec<f64>, length: f64| -> Vec<f64> {
         let raw: Vec<f64> = squares(PI / whole)
             .iter()

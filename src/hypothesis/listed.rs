@@ -5,6 +5,7 @@ use super::scales::{Scales, largest};
 use super::term::{Nature, Part, Start, Term, with_terms};
 use crate::effect::{Effect, Magnitude, OutputMark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
+use crate::hypothesis::limits::TERM;
 use crate::likelihood::kalman::FilterError;
 use crate::record::Signal;
 use crate::twin::{Law, Parameter, Twin};
@@ -13,13 +14,6 @@ use std::collections::BTreeMap;
 /// Shares of its range at which a size with two ends is tried, besides next to nothing. A part of a signal that is rectified, the only such
 /// size of the library, folds the output at a half.
 const LARGE: [f64; 4] = [0.3, 0.6, 0.9, 1.0];
-
-/// Frequencies in 1/T that are tried: half a cycle apart, since a gain falls off within one; the slow ones in any case, up to eight cycles.
-pub(super) const FREQUENCIES_PER_CYCLE: f64 = 2.0;
-const SLOW: usize = 16;
-
-/// Nats for a mark that outputs bear, such as repeated values of a quantiser.
-const MARK_PRESENT: f64 = 12.0;
 
 /// Twin and record that effects are looked for in.
 pub(crate) struct Library<'a> {
@@ -171,8 +165,8 @@ impl Library<'_> {
 
     /// The frequencies and slow ones: θ answers a slow wave, so that residuals hardly show it.
     fn with_slow_ones(&self) -> Vec<f64> {
-        let cycle = FREQUENCIES_PER_CYCLE * self.scales.duration();
-        let slow = (2..=SLOW).map(|i| i as f64 / cycle);
+        let cycle = TERM.frequencies_per_cycle * self.scales.duration();
+        let slow = (2..=TERM.slow).map(|i| i as f64 / cycle);
         let mut all: Vec<f64> = slow.chain(self.frequencies.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
         all.dedup();
@@ -279,7 +273,7 @@ fn marked(term: &mut Term, shown: &[f64], values: &[f64]) {
     let rounds = matches!(&term.part, Part::Effect { effect, .. } if matches!(effect.law(), Law::Rounding(_)));
     term.mark = match !rounds && on_levels(values) {
         true => 0.0,
-        false => MARK_PRESENT,
+        false => TERM.mark_present,
     };
     term.axes.iter_mut().for_each(|axis| axis.held = true);
 }

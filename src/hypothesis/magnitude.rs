@@ -2,22 +2,13 @@
 
 use crate::effect::{Effect, Magnitude, Shape, TargetKind};
 use crate::fit::axis::{Axis, EvidencePrior};
+use crate::hypothesis::limits::TERM;
 use crate::math::{deviation, ends, quantile};
 use crate::twin::{Interval, Law, Parameter};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Longest lag or delay, as a share of the record: a longer one shows fewer than four times, and passes for the twin's own motion. At half
-/// of it, a delay of 0.15 records is told as two shorter ones.
-const LONGEST: f64 = 0.25;
-/// Shortest lag or delay, in steps: less is nothing.
-const SHORTEST: f64 = 0.3;
-/// Times of a change that are tried, evenly over the record.
-pub(super) const TIMES: usize = 9;
 /// Levels that are tried for a threshold: shares of the values that lie below an upper one, above a lower one.
 const LEVELS: [f64; 6] = [0.97, 0.9, 0.8, 0.65, 0.5, 0.35];
-/// Share of the span of a state by which a level may lie beyond it: the twin that lacks the threshold follows the record with other values of
-/// the state, and where its scale shows in no output, with any. Without it, a ceiling of tanks ended 2 nats short.
-const BEYOND: f64 = 0.5;
 /// Limits of a rate that are tried, as shares of the fastest step of the record.
 const RATES: [f64; 5] = [0.02, 0.05, 0.1, 0.2, 0.5];
 /// Widths that are tried, in deviations of the signal.
@@ -26,9 +17,6 @@ const WIDTHS: [f64; 4] = [0.2, 0.6, 1.5, 3.0];
 const KNEES: [f64; 3] = [0.02, 0.08, 0.25];
 /// Shares of its range at which a number with two ends is tried.
 const SHARES: [f64; 5] = [0.0, 0.1, 0.3, 0.6, 1.0];
-/// Longest step of a fit to a level, in its range. A step that is cut is cut for θ, too: with 0.15, diagnoses of real tanks with a ceiling
-/// ended 50 nats short.
-const LONGEST_TO_LEVEL: f64 = 0.5;
 
 /// An effect on a record: values of the signal or state that it bends, steps and length in seconds.
 pub(super) struct Ranges<'a> {
@@ -75,8 +63,8 @@ impl Ranges<'_> {
             (_, Some(off)) if off.is_infinite() => self.threshold(parameter, off > 0.0),
             (Shape::Delay | Shape::TimeConstant, Some(_)) => self.lateness(parameter),
             (Shape::Time, _) => {
-                let part = self.duration / (TIMES + 1) as f64;
-                let grid = (1..=TIMES).map(|i| part * i as f64).collect();
+                let part = self.duration / (TERM.times + 1) as f64;
+                let grid = (1..=TERM.times).map(|i| part * i as f64).collect();
                 linear(parameter, (0.0, self.duration), grid)
             }
             (Shape::Frequency, _) => {
@@ -140,7 +128,7 @@ impl Ranges<'_> {
     fn threshold(&self, parameter: &Parameter, is_upper: bool) -> (Vec<f64>, Axis) {
         let (low, high) = self.ends();
         let beyond = match self.effect.law().target() {
-            TargetKind::State => BEYOND * (high - low),
+            TargetKind::State => TERM.beyond * (high - low),
             _ => 0.0,
         };
         let (low, high) = match is_upper {
@@ -152,20 +140,20 @@ impl Ranges<'_> {
             .filter_map(|p| quantile(self.values, if is_upper { *p } else { 1.0 - p }).ok())
             .collect();
         let (grid, axis) = linear(parameter, range, grid);
-        let longest = LONGEST_TO_LEVEL * (range.1 - range.0);
+        let longest = TERM.longest_to_level * (range.1 - range.0);
         (grid, Axis { longest, ..axis })
     }
 
     /// Lag or delay.
     fn lateness(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
-        let mut longest = (LONGEST * self.duration).max(2.0 * SHORTEST * self.dt);
+        let mut longest = (TERM.longest * self.duration).max(2.0 * TERM.shortest * self.dt);
         if let Some(most) = self.effect.kind().longest_dead_time(self.dt) {
             longest = longest.min(most);
         }
         let octaves = std::iter::successors(Some(0.5 * self.dt), |tau| Some(2.0 * tau));
         let octaves = octaves.take_while(|tau| *tau < longest);
         let grid = octaves.chain([longest]).collect();
-        logarithmic(parameter, (SHORTEST * self.dt, longest), grid)
+        logarithmic(parameter, (TERM.shortest * self.dt, longest), grid)
     }
 
     /// Frequency of a mode: from two cycles of the record, by octaves, and where residuals peak. Where a look is dear, every second octave.

@@ -10,25 +10,22 @@
 
 use super::basis::Of;
 use super::entry::Entry;
-use super::functions::{MOST_STATES, Variable, of_trace, of_trail, spread, visited};
+use super::functions::{Variable, of_trace, of_trail, spread, visited};
 use super::listed::Library;
 use super::scales::Scales;
 use super::term::Term;
 use super::trace::Trace;
 use crate::effect::{TargetKind, targets};
+use crate::hypothesis::limits::TERM;
 use crate::math::correlation;
 use crate::twin::{Role, is_memory};
 
 /// Time constants, from a step and a half to an eighth of the record: a factor of 1.5 apart in 300 rows. They share one prior, so that more of
 /// them cost time alone; with half of them a lag between two loses a nat or two.
 const LAGS: usize = 9;
-/// Time constants of signals of a black box, whose functions are not screened.
-const LAGS_OF_BOX: usize = 3;
 /// Widths of a play, in ranges of the signal: below a tenth it is the signal itself, above 0.8 it hardly moves.
 const WIDTHS: [f64; 6] = [0.1, 0.2, 0.3, 0.45, 0.6, 0.8];
 const WIDTHS_OF_BOX: [f64; 2] = [0.25, 0.5];
-/// Correlation from which an output shows nothing but a state, and its traces are those of the state.
-const SAME: f64 = 0.999;
 
 /// A signal that may leave a trace.
 struct TracedSignal {
@@ -84,7 +81,7 @@ impl Traces<'_> {
         let (lags, widths): (Vec<f64>, &[f64]) = match scales.has_equations() {
             true => (spread::<LAGS>(1.5 * dt, duration / 8.0).to_vec(), &WIDTHS),
             false => (
-                spread::<{ LAGS_OF_BOX + 1 }>(1.5 * dt, duration / 8.0)[1..].to_vec(),
+                spread::<{ TERM.lags_of_box + 1 }>(1.5 * dt, duration / 8.0)[1..].to_vec(),
                 &WIDTHS_OF_BOX,
             ),
         };
@@ -143,7 +140,7 @@ impl Traces<'_> {
                     _ => !is_memory(&source.name),
                 })
                 .partition(|source| source.kind == TargetKind::State);
-        let is_large = states.len() > MOST_STATES;
+        let is_large = states.len() > TERM.most_states;
         let places = self.places();
         let mut terms = vec![];
         for source in states.iter().chain(&signals) {
@@ -197,7 +194,7 @@ impl Traces<'_> {
         let is_same = |i: usize, j: usize| {
             let outputs = all.chunks_exact(n + p).map(|row| row[n + j]);
             let pairs: Vec<(f64, f64)> = columns[i].iter().copied().zip(outputs).collect();
-            !pairs.is_empty() && correlation(&pairs).abs() > SAME
+            !pairs.is_empty() && correlation(&pairs).abs() > TERM.same_trace
         };
         (0..p).map(|j| (0..n).find(|&i| is_same(i, j))).collect()
     }

@@ -12,19 +12,10 @@ use super::functions::locked_wave;
 use super::listed::Library;
 use super::term::Term;
 use crate::effect::{TargetKind, targets};
+use crate::hypothesis::limits::TERM;
 use crate::twin::{Role, is_memory};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
-
-/// Multiples of the frequency: symmetric laws answer in odd ones, others in the second first.
-const HARMONICS: usize = 3;
-/// Share of a signal's variance that a line must hold: a square wave's first harmonic holds 0.8, a saw tooth's 0.6. Of inputs that draw a
-/// level anew twelve times a record a quarter pass, of 24 times none; at 0.4 half of the first pass, at 0.6 few, and no saw tooth does.
-const LINE: f64 = 0.5;
-/// Cycles of the record from which a line is one.
-const LEAST_CYCLES: f64 = 1.5;
-/// Points of a periodogram for each cycle of the record.
-const FINE: usize = 8;
 
 /// Locked waves at every place of a twin; none where no signal repeats itself.
 pub(super) fn responses(library: &Library<'_>) -> Vec<Term> {
@@ -47,7 +38,7 @@ pub(super) fn responses(library: &Library<'_>) -> Vec<Term> {
     let places = places(library);
     let mut terms = vec![];
     for (signal, frequency) in lines {
-        let multiples = (1..=HARMONICS).map(|n| n as f64 * frequency);
+        let multiples = (1..=TERM.harmonics).map(|n| n as f64 * frequency);
         for frequency in multiples.filter(|f| *f < 0.5 / dt) {
             let wave = |(kind, target, largest): &(TargetKind, String, f64)| {
                 locked_wave(kind.name(), target, signal, *largest, frequency)
@@ -92,19 +83,19 @@ fn line(values: &[f64], dt: f64) -> Option<f64> {
         .map(|v| Complex::new(if v.is_finite() { v - mean } else { 0.0 }, 0.0))
         .collect();
     let whole: f64 = series.iter().map(Complex::norm_sqr).sum();
-    series.resize(FINE * n, Complex::new(0.0, 0.0));
+    series.resize(TERM.periodogram_points * n, Complex::new(0.0, 0.0));
     FftPlanner::new()
-        .plan_fft_forward(FINE * n)
+        .plan_fft_forward(TERM.periodogram_points * n)
         .process(&mut series);
-    let first = (LEAST_CYCLES * FINE as f64) as usize;
-    let power: Vec<f64> = series[..FINE * n / 2]
+    let first = (TERM.least_cycles * TERM.periodogram_points as f64) as usize;
+    let power: Vec<f64> = series[..TERM.periodogram_points * n / 2]
         .iter()
         .map(Complex::norm_sqr)
         .collect();
     let top = (first..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
     // A sine of amplitude a has n·a²/2 in the record and n²·a²/4 at its peak.
     let share = 2.0 * power[top] / (n as f64 * whole);
-    (share > LINE).then(|| top as f64 / ((FINE * n) as f64 * dt))
+    (share > TERM.line).then(|| top as f64 / ((TERM.periodogram_points * n) as f64 * dt))
 }
 
 #[cfg(test)]

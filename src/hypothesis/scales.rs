@@ -1,19 +1,15 @@
 //! Sizes of a record's signals, states and rates: the units that hypotheses are looked for in.
 
 use crate::effect::TargetKind;
+use crate::hypothesis::limits::TERM;
 use crate::math::deviation;
 use crate::record::{Record, Signal};
 use crate::twin::{Acting, Outline, Parameter, Twin};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-/// Change of a magnitude whose consequences are looked at, as a share of where fits start; where those are far off, of what the rates vary.
-const SHARE: f64 = 1e-3;
 /// Changes of rates and outputs, as shares of what they vary, that neither rounding nor a bent law spoils.
 const SEEN: RangeInclusive<f64> = 1e-8..=0.1;
-/// Factor to a change that is seen from one that is not, and how often it is looked for.
-const FARTHER: f64 = 1e5;
-const LOOKS: usize = 5;
 
 /// Records, the states that the twin has along them, and how fast these move.
 pub(crate) struct Scales {
@@ -161,8 +157,8 @@ pub(super) fn largest(
     states: &[Signal],
 ) -> Option<f64> {
     let prior = parameter.prior;
-    let mut step = SHARE * prior.high().abs().max(prior.low().abs());
-    for _ in 0..LOOKS {
+    let mut step = TERM.change * prior.high().abs().max(prior.low().abs());
+    for _ in 0..TERM.looks {
         let mut moved = theta.to_vec();
         moved[j] = parameter.bounds.clamp(moved[j] + step);
         step = moved[j] - theta[j];
@@ -172,10 +168,10 @@ pub(super) fn largest(
         let change = change(twin, [theta, &moved], records, states)?;
         // Starts are for signals of size 1; those of others are lost in rounding, or bend the twin.
         match change {
-            0.0 => step *= FARTHER,
+            0.0 => step *= TERM.farther,
             c if SEEN.contains(&c) => return Some(step.abs() / c),
-            c if c.is_finite() => step *= SHARE / c,
-            _ => step /= FARTHER,
+            c if c.is_finite() => step *= TERM.change / c,
+            _ => step /= TERM.farther,
         }
     }
     None

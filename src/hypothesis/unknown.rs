@@ -3,8 +3,9 @@
 use super::basis::Of;
 use super::entry::Entry;
 use super::functions::{
-    MOST_STATES, PASTS, Variable, entered, of_past, of_signal, of_state, spread, visited, wave,
+    PASTS, Variable, entered, of_past, of_signal, of_state, spread, visited, wave,
 };
+use super::limits::TERM;
 use super::listed::Library;
 use super::magnitude::uniform_axis;
 use super::remembered::remembered;
@@ -90,7 +91,7 @@ pub(crate) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
         }
         for (a, (first, one)) in of_states.iter().enumerate() {
             for (second, two) in &of_states[a + 1..] {
-                if own.len() <= MOST_STATES || *first == i || *second == i {
+                if own.len() <= TERM.most_states || *first == i || *second == i {
                     terms.push(of_state(target, &[one.clone(), two.clone()], largest));
                 }
             }

@@ -7,7 +7,7 @@ use super::document::{Block, Document, Picture, Section};
 use super::parameters::{ParameterRow, priors, values};
 use super::record::overlay_svg;
 use super::residuals::{Left, residual_blocks};
-use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Profile, Side, depth};
+use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Profile, depth};
 use crate::record::Record;
 use crate::study::Study;
 use crate::twin::{Parameter, ParameterSpace};
@@ -335,12 +335,8 @@ pub(crate) fn posterior_svg(study: &Study, posterior: &Posterior) -> String {
 fn described(p: &FittedValue, space: &ParameterSpace) -> ParameterRow {
     let own = (space.iter().find(|own| own.name == p.name).cloned())
         .unwrap_or_else(|| Parameter::new(&p.name, &p.unit, p.low, p.high));
-    let at_bound = p.at_bound.map(|side| match side {
-        Side::Low => "low",
-        Side::High => "high",
-    });
     ParameterRow {
-        at_bound,
+        at_bound: p.at_bound,
         by_profile: p.by_profile,
         ..ParameterRow::new(&own, p.value, p.std_error, [p.low, p.high])
     }

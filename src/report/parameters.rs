@@ -6,7 +6,7 @@ use super::document::Column::{Number, Text};
 use crate::diagnose::FittedParameter;
 use crate::math::three_digits;
 use crate::setting::number;
-use crate::twin::{Interval, PRIOR_DEVIATION, Parameter, Role};
+use crate::twin::{Interval, PRIOR_DEVIATION, Parameter, Role, Side};
 use serde::Serialize;
 
 /// Share of the prior from which on a remark names it.
@@ -32,7 +32,7 @@ pub(super) struct ParameterRow {
     /// Variance over that of the prior box, at most 1: near 0 the record decides, near 1 it adds nothing to the prior.
     pub prior_share: f64,
     /// The bound that the value lies at: `low` or `high`.
-    pub at_bound: Option<&'static str>,
+    pub at_bound: Option<Side>,
     /// The value itself owes this share to the prior: it is an estimate of a network that has learnt the prior.
     #[serde(skip)]
     pub leans: bool,
@@ -69,9 +69,7 @@ impl ParameterRow {
 
     /// One parameter of a diagnosis.
     pub fn diagnosed(p: &FittedParameter) -> Self {
-        let parameter = Parameter::new(&p.name, &p.unit, p.prior.low(), p.prior.high())
-            .within(p.bounds.low(), p.bounds.high());
-        Self::new(&parameter, p.refitted, p.std_error, p.interval)
+        Self::new(&p.parameter(), p.refitted, p.std_error, p.interval)
     }
 
     /// The same with values at other stages.
@@ -109,7 +107,7 @@ impl ParameterRow {
         let [low, high] = self.interval;
         let is_outside = high < self.prior.low() || low > self.prior.high();
         match (self.at_bound, self.role) {
-            (Some("low"), _) => "at lower bound",
+            (Some(Side::Low), _) => "at lower bound",
             (Some(_), _) => "at upper bound",
             (None, Role::Parameter) if self.prior_share >= 1.0 => "not identified",
             (None, Role::Parameter) if is_outside => "outside prior",

@@ -7,7 +7,7 @@ use crate::fit::{
 };
 use crate::hypothesis::search::asked::with_asked_noise;
 use crate::hypothesis::search::effects::searched;
-use crate::likelihood::{Beliefs, STANDS, measured};
+use crate::likelihood::{Beliefs, measured, with_better_start};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
@@ -80,15 +80,10 @@ impl Study {
         let stage = progress.stage("fit", 1);
         let (mut fit, elsewhere) = study.fit_once(asks, records, settings)?;
         if elsewhere && !self.file.effect.is_empty() {
-            // An effect of the study may be what bends the reading of the start.
-            let (trusting, _) = (study.trusting_starts()).fit_once(asks, records, settings)?;
+            let trusting = study.trusting_starts();
+            let again = || (trusting.fit_once(asks, records, settings)).map(|(fit, _)| fit);
             let log_z = |fit: &Fit| Some(fit.evidence.as_ref()?.log_evidence);
-            let gain = log_z(&trusting)
-                .zip(log_z(&fit))
-                .map(|(held, given_up)| held - given_up);
-            if gain.is_some_and(|gain| gain > STANDS) {
-                fit = trusting;
-            }
+            (fit, _) = with_better_start(fit, log_z, again)?;
         }
         fit.seconds = clock.elapsed().as_secs_f64();
         stage.tick()?;

@@ -44,6 +44,6 @@ pub(crate) use names::{check_twin, is_memory};
 pub(crate) use noise::mix;
 pub use noise::{Noise, Source};
 pub(crate) use parameter::{PRIOR_DEVIATION, combination, oriented};
-pub use parameter::{Parameter, ParameterSpace, Role};
+pub use parameter::{Parameter, ParameterSpace, Role, Side};
 pub(crate) use points::{Layout, MOST_STATES, Points};
 pub use state_space::{Outliers, Outline, StateSpace};

@@ -60,6 +60,17 @@ impl Role {
     }
 }
 
+/// Side of a bound.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Side {
+    /// Lower bound.
+    Low,
+    /// Upper bound.
+    High,
+}
+
 /// One parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
@@ -76,12 +87,12 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// Bound that a value with this standard error lies at: `low` or `high`.
-    pub(crate) fn bound_at(&self, value: f64, std_error: f64) -> Option<&'static str> {
+    /// Bound that a value with this standard error lies at.
+    pub(crate) fn bound_at(&self, value: f64, std_error: f64) -> Option<Side> {
         let reach = AT_BOUND * std_error;
         match value {
-            value if value - self.bounds.low() <= reach => Some("low"),
-            value if self.bounds.high() - value <= reach => Some("high"),
+            value if value - self.bounds.low() <= reach => Some(Side::Low),
+            value if self.bounds.high() - value <= reach => Some(Side::High),
             _ => None,
         }
     }

@@ -177,10 +177,12 @@ fn constants(sources: &Crate) -> Vec<String> {
     let mut places = Vec::new();
     for source in sources.sources.values() {
         let words: Vec<&str> = source.code.split(' ').collect();
-        let constants = words
-            .windows(4)
-            .filter(|words| words[0] == "const" && words[2] == ":" && is_number(words[3]));
-        places.extend(constants.map(|words| format!("{} {}", source.file.display(), words[1])));
+        // A number in angle brackets is a parameter of a type.
+        let constants = words.windows(5).filter(|words| {
+            let is_parameter = ["<", ","].contains(&words[0]);
+            words[1] == "const" && words[3] == ":" && is_number(words[4]) && !is_parameter
+        });
+        places.extend(constants.map(|words| format!("{} {}", source.file.display(), words[2])));
     }
     places
 }

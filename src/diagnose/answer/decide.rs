@@ -8,7 +8,7 @@
 
 use super::posterior::{Mass, Posterior};
 use crate::diagnose::outcome::{Decision, TargetShare, Verdict};
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::effect::EffectKey;
 
 /// Verdict, decision, the effects that the twin is given, their rivals, and the probabilities behind them.
@@ -25,7 +25,7 @@ pub(in crate::diagnose) struct Answer {
 impl Answer {
     /// The kind of gap: structural where the evidence says so, otherwise by whether θ left its prior significantly; nothing is decided yet.
     pub fn new(posterior: Posterior, left_prior: bool) -> Self {
-        let verdict = match posterior.log_odds > Thresholds::GAP {
+        let verdict = match posterior.log_odds > THRESHOLDS.gap {
             true => Verdict::StructuralGap,
             false if left_prior => Verdict::ParameterGap,
             false => Verdict::NoGap,
@@ -50,7 +50,7 @@ impl Answer {
             };
         };
         // An effect of the first set that is less probable than not is not accepted where another one is.
-        let is_said = |key: &&String| posterior.name(key) >= Thresholds::SAID;
+        let is_said = |key: &&String| posterior.name(key) >= THRESHOLDS.said;
         let said: Vec<String> = first.keys.iter().filter(is_said).cloned().collect();
         let first = (posterior.sets.iter().find(|set| set.keys == said)).unwrap_or(first);
         // A set that contains the first is no rival of it: it says that there may be more.
@@ -110,14 +110,14 @@ impl Posterior {
     /// The sets that the answer is about; none where listed effects hold less than half of all mass.
     fn family(&self) -> Vec<&Mass> {
         let mut family: Vec<&Mass> = vec![];
-        if self.kinds.listed + self.kinds.partial < Thresholds::SAID {
+        if self.kinds.listed + self.kinds.partial < THRESHOLDS.said {
             return family;
         }
         let mut held = 0.0;
         for set in &self.sets {
             let is_near = (family.first())
-                .is_none_or(|first| set.all() > first.all() * (-Thresholds::RIVALS).exp());
-            if !is_near && held >= Thresholds::SAID {
+                .is_none_or(|first| set.all() > first.all() * (-THRESHOLDS.rivals).exp());
+            if !is_near && held >= THRESHOLDS.said {
                 break;
             }
             held += set.all();

@@ -12,8 +12,7 @@
 //! of its own variable, at its place. What it explains more is something unknown beside the effect, if that is 15 % at most.
 
 use crate::diagnose::outcome::{Probabilities, TargetShare};
-use crate::diagnose::price::Price;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::{Price, THRESHOLDS};
 use crate::fit::evidence::log_mean;
 use std::collections::BTreeMap;
 
@@ -152,8 +151,8 @@ impl Hypotheses {
 
     /// log weight of each listed effect, and of each unknown function.
     fn shares(&self) -> [f64; 2] {
-        let each = Thresholds::LISTED / self.singles().count().max(1) as f64;
-        let every = (1.0 - Thresholds::LISTED) / self.searched.max(1) as f64;
+        let each = THRESHOLDS.listed / self.singles().count().max(1) as f64;
+        let every = (1.0 - THRESHOLDS.listed) / self.searched.max(1) as f64;
         [each.ln(), every.ln()]
     }
 
@@ -166,8 +165,8 @@ impl Hypotheses {
         let others = self.singles().filter(|s| !set.keys.contains(&s.keys[0]));
         let stands_alone = best(others).max(0.0) < own / 3.0;
         self.has_equations
-            && added < Thresholds::REST * (own + added)
-            && (own > (1.0 - Thresholds::OUTDONE) * best_function || stands_alone)
+            && added < THRESHOLDS.rest * (own + added)
+            && (own > (1.0 - THRESHOLDS.outdone) * best_function || stands_alone)
     }
 
     /// The set beside which a function stands once effects that it holds in another form are told apart from it: the best known one.
@@ -195,7 +194,7 @@ impl Hypotheses {
         let credit = (top - function.log_z).min(0.0).exp();
         let sum: f64 = held.iter().map(|set| (set.log_z - top).exp()).sum();
         let leaves_rest =
-            self.has_equations && top > (1.0 - Thresholds::OUTDONE) * function.log_z.max(0.0);
+            self.has_equations && top > (1.0 - THRESHOLDS.outdone) * function.log_z.max(0.0);
         let shares = (held.into_iter())
             .map(|set| (set.keys[0].as_str(), credit * (set.log_z - top).exp() / sum))
             .collect();
@@ -211,7 +210,7 @@ impl Hypotheses {
         let unknown: Vec<f64> = self.functions.iter().map(|f| every + f.log_z).collect();
         let mut beside = vec![];
         for set in &self.sets {
-            let second = Thresholds::SECOND.ln() + each + every - price.of(set.keys.len());
+            let second = THRESHOLDS.second.ln() + each + every - price.of(set.keys.len());
             for function in set.beside.iter().flatten() {
                 beside.push((set, function, second + function.log_z));
             }
@@ -250,7 +249,7 @@ impl Hypotheses {
         };
         match (best(1), best(2)) {
             (Some(one), Some(two)) => {
-                two - self.price().prior > (1.0 - Thresholds::FINE_PRINT) * one
+                two - self.price().prior > (1.0 - THRESHOLDS.fine_print) * one
             }
             (one, two) => one.is_none() && two.is_some(),
         }
@@ -276,7 +275,7 @@ impl Odds {
 
     /// Probability of a gap.
     fn gap(self) -> f64 {
-        1.0 / (1.0 + (Thresholds::GAP - self.even).exp())
+        1.0 / (1.0 + (THRESHOLDS.gap - self.even).exp())
     }
 }
 

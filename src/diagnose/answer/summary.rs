@@ -4,7 +4,7 @@ use super::Answer;
 use crate::diagnose::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};
 use crate::diagnose::search::Explanations;
 use crate::diagnose::settings::DiagnoseSettings;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::Nuisance;
 use crate::fit::follow::starts;
 use crate::fit::posterior::FitIntervals;
@@ -50,7 +50,7 @@ pub(in crate::diagnose) fn effects(
         first.append(&mut all);
         all = first;
     }
-    all.truncate(Thresholds::REPORTED);
+    all.truncate(THRESHOLDS.reported);
     all
 }
 
@@ -59,7 +59,7 @@ pub(in crate::diagnose) fn absorbed(all: &[Explanation], within: f64) -> Vec<Eff
     let share = 1.0 / all.len().max(1) as f64;
     (all.iter())
         .filter_map(|e| Some(fit_of(e.model.as_ref()?, e.last(), share, e.log_z - within)))
-        .take(Thresholds::REPORTED)
+        .take(THRESHOLDS.reported)
         .collect()
 }
 
@@ -96,7 +96,7 @@ pub(in crate::diagnose) fn parameters(
     settings: &DiagnoseSettings,
 ) -> Result<Vec<FittedParameter>, StudyError> {
     let noise = settings.noise().child("parameters");
-    let level = Thresholds::INTERVAL_LEVEL;
+    let level = THRESHOLDS.interval_level;
     let spread = FitIntervals::drawn(&model.problem, &model.fitted, level, noise)?;
     let theta = model.theta();
     let space = model.base.parameters();

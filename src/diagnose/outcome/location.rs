@@ -1,6 +1,6 @@
 //! Location of a gap: in the equations, in time, in the states, by lag and by frequency.
 
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use serde::{Serialize, Serializer};
 
 /// Location of a gap.
@@ -37,7 +37,7 @@ impl TargetShare {
     /// The target and the places that the records cannot tell from it, most probable first; empty where there are none.
     pub(in crate::diagnose) fn alike(targets: &[Self], target: &str) -> Vec<String> {
         let most = targets.first().map_or(0.0, |t| t.probability);
-        let least = most * (-Thresholds::RIVALS).exp();
+        let least = most * (-THRESHOLDS.rivals).exp();
         let others = (targets.iter())
             .filter(|t| t.probability >= least && t.target != target)
             .map(|t| t.target.as_str());
@@ -180,7 +180,7 @@ pub(crate) trait Cell {
     fn share(&self) -> f64;
     /// Returns true where the cell stands out.
     fn is_notable(&self) -> bool {
-        self.score() >= Thresholds::NOTABLE
+        self.score() >= THRESHOLDS.notable
     }
 }
 

@@ -14,7 +14,7 @@ pub(in crate::diagnose) use warnings::warnings;
 
 use crate::fit::{Nuisance, Warning};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{Hold, Integrator, Interval};
+use crate::twin::{Hold, Integrator, Interval, Parameter};
 use serde::ser::{SerializeStruct, Serializer};
 use serde::{Deserialize, Serialize};
 
@@ -112,6 +112,14 @@ pub struct FittedParameter {
     pub prior: Interval,
     /// The physical bounds.
     pub bounds: Interval,
+}
+
+impl FittedParameter {
+    /// The parameter of the twin.
+    pub(crate) fn parameter(&self) -> Parameter {
+        Parameter::new(&self.name, &self.unit, self.prior.low(), self.prior.high())
+            .within(self.bounds.low(), self.bounds.high())
+    }
 }
 
 /// One listed effect, fitted.

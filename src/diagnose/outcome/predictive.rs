@@ -1,6 +1,6 @@
 //! Predictive check of an all-clear.
 
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use serde::Serialize;
 
 /// Comparison of the measured records with records that the fitted twin simulates, noise and all.
@@ -23,13 +23,13 @@ pub struct PredictiveCheck {
 impl PredictiveCheck {
     /// Returns whether the records look like simulated ones.
     pub fn is_passed(&self) -> bool {
-        self.p_value > Thresholds::CHECK_LEVEL
+        self.p_value > THRESHOLDS.check_level
     }
 
     /// Returns whether noise of a kind or size that was not declared puts much into the output.
     pub fn is_loud(&self) -> bool {
         self.noise_share
-            .is_some_and(|share| share > Thresholds::SWALLOWED)
+            .is_some_and(|share| share > THRESHOLDS.swallowed)
     }
 
     /// Probability that nothing is missing where the check refutes an all-clear; `None` where it does not. A failed check leaves what its

@@ -3,7 +3,7 @@
 use super::FittedParameter;
 use crate::fit::Warning;
 use crate::record::Record;
-use crate::twin::{Parameter, Twin};
+use crate::twin::Twin;
 
 /// Lists what makes a diagnosis doubtful: constant channels, repeated records, parameters at a bound, a coarse step, a
 /// search that saw some of the rows.
@@ -31,9 +31,7 @@ pub(in crate::diagnose) fn warnings(
         all.push(Warning::new("validation-is-record", what));
     }
     for p in parameters {
-        let parameter = Parameter::new(&p.name, &p.unit, p.prior.low(), p.prior.high())
-            .within(p.bounds.low(), p.bounds.high());
-        let side = parameter.bound_at(p.refitted, p.std_error);
+        let side = p.parameter().bound_at(p.refitted, p.std_error);
         all.extend(side.map(|side| Warning::at_bound("at-bound", &p.name, side)));
     }
     if has_finer_step {

@@ -15,7 +15,7 @@
 use super::{Predictive, Replicate};
 use crate::diagnose::outcome::{Burst, HiddenDisturbance, TargetShare};
 use crate::diagnose::quantify::free_run::{mean, root};
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::effect::{TargetKind, targets};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
@@ -62,7 +62,7 @@ impl Predictive<'_> {
         let fitted = &self.model.fitted.theta;
         let measured = courses(problem, fitted, &problem.records, &places)?;
         let (reference, _) = self.reference();
-        let replicates = self.replicates(0..Thresholds::CHECK_FIRST, |_| &reference)?;
+        let replicates = self.replicates(0..THRESHOLDS.check_first, |_| &reference)?;
         let simulated: Vec<Vec<Course>> = (replicates.par_iter())
             .map(|Replicate { records, .. }| courses(problem, fitted, records, &places))
             .collect::<Result<_, _>>()?;

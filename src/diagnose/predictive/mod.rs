@@ -23,7 +23,7 @@ pub(in crate::diagnose) use reference::declared;
 
 use super::outcome::{Predicted, PredictiveCheck};
 use super::quantify::free_run::mean;
-use super::thresholds::Thresholds;
+use super::thresholds::THRESHOLDS;
 use crate::fit::posterior::PosteriorSample;
 use crate::fit::problem::Problem;
 use crate::hypothesis::search::model::Model;
@@ -62,13 +62,13 @@ impl Predictive<'_> {
         let measured = self.measured(&statistics)?;
         let mut simulated: Vec<Look> = vec![];
         let mut compared = None;
-        for count in [Thresholds::CHECK_FIRST, Thresholds::CHECK_RECORDS] {
+        for count in [THRESHOLDS.check_first, THRESHOLDS.check_records] {
             let draw = |i: usize| &self.draws.thetas[i % self.draws.thetas.len()];
             let all = self.replicates(simulated.len()..count, draw)?;
             simulated.extend(looks(problem, &all, &statistics)?);
             compared = Some(compare(&statistics, &measured, &simulated));
             let is_clear = |check: &PredictiveCheck| {
-                check.p_value * (simulated.len() + 1) as f64 > Thresholds::CHECK_ENOUGH
+                check.p_value * (simulated.len() + 1) as f64 > THRESHOLDS.check_enough
             };
             if compared.as_ref().is_some_and(is_clear) {
                 break;
@@ -88,7 +88,7 @@ impl Predictive<'_> {
             .draws
             .thetas
             .iter()
-            .step_by((self.draws.thetas.len() / Thresholds::CHECK_FIRST).max(1));
+            .step_by((self.draws.thetas.len() / THRESHOLDS.check_first).max(1));
         let measured: Vec<Replicate> = draws
             .map(|theta| Replicate {
                 theta: theta.clone(),
@@ -110,11 +110,9 @@ impl Predictive<'_> {
         numbers: Range<usize>,
         theta: impl Fn(usize) -> &'t Vec<f64> + Sync,
     ) -> Result<Vec<Replicate>, StudyError> {
-        let all: Vec<Option<Replicate>> = numbers
-            .into_par_iter()
-            .map(|i| self.replicate(i, theta(i).clone()))
-            .collect::<Result<_, StudyError>>()?;
-        Ok(all.into_iter().flatten().collect())
+        (numbers.into_par_iter())
+            .filter_map(|i| self.replicate(i, theta(i).clone()).transpose())
+            .collect()
     }
 
     fn replicate(&self, i: usize, theta: Vec<f64>) -> Result<Option<Replicate>, StudyError> {
@@ -138,10 +136,11 @@ fn looks(
     replicates: &[Replicate],
     statistics: &[Discrepancy],
 ) -> Result<Vec<Look>, StudyError> {
-    let all: Vec<Option<Look>> = (replicates.par_iter())
-        .map(|one| statistics::look(problem, &one.records, &one.theta, statistics))
-        .collect::<Result<_, StudyError>>()?;
-    Ok(all.into_iter().flatten().collect())
+    (replicates.par_iter())
+        .filter_map(|one| {
+            statistics::look(problem, &one.records, &one.theta, statistics).transpose()
+        })
+        .collect()
 }
 
 /// Compares statistics of the measured records with those of simulated ones.

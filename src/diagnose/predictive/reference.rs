@@ -3,7 +3,7 @@
 use super::statistics::{Discrepancy, Look};
 use super::{Predictive, looks};
 use crate::diagnose::quantify::free_run::mean;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::problem::Problem;
 use crate::study::StudyError;
 use crate::twin::{Role, Twin};
@@ -37,7 +37,7 @@ impl Predictive<'_> {
             if p.role == Role::Noise && is_declared {
                 let axis = &problem.axes[j];
                 let beyond = (theta[j] / axis.centre).ln() / axis.deviation;
-                is_other |= beyond > Thresholds::BEYOND_DECLARED;
+                is_other |= beyond > THRESHOLDS.beyond_declared;
                 theta[j] = axis.centre;
             }
         }
@@ -67,7 +67,7 @@ impl Predictive<'_> {
         let Some(at) = statistics.iter().rposition(Discrepancy::is_window) else {
             return Ok(None);
         };
-        let replicates = self.replicates(0..Thresholds::CHECK_FIRST, |_| &theta)?;
+        let replicates = self.replicates(0..THRESHOLDS.check_first, |_| &theta)?;
         let of = &statistics[at..=at];
         let declared = looks(&self.model.problem, &replicates, of)?;
         let squares = |values: &mut dyn Iterator<Item = f64>| {

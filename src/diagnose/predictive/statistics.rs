@@ -2,7 +2,7 @@
 
 use crate::diagnose::quantify::free_run::{Runner, variances};
 use crate::diagnose::quantify::horizon::{HeldOutRows, Predictor, Reach, reaches};
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::recoverable;
 use crate::record::Record;
@@ -200,7 +200,7 @@ pub(super) fn squared(series: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// Σ n·ρ_l² over the lags, n the number of pairs.
 pub(super) fn correlation(series: &[Vec<f64>]) -> f64 {
     let power = mean_power(series, 2);
-    (1..=Thresholds::LAGS)
+    (1..=THRESHOLDS.lags)
         .map(|lag| {
             let pairs = (series.iter()).flat_map(|all| all.iter().zip(all.iter().skip(lag)));
             let there = pairs

@@ -1,7 +1,7 @@
 //! Free-run errors, and the share of a gap that effects close.
 
 use crate::diagnose::outcome::FreeRuns;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, States, recoverable};
 use crate::math::median;
@@ -59,7 +59,7 @@ impl Runner {
     pub fn floor(&self, record: &Record, from: usize, noise: Noise) -> Option<f64> {
         let free = self.outputs(record)?;
         let scale = variances(record.outputs());
-        let errors: Vec<f64> = (0..Thresholds::FLOOR_RECORDS)
+        let errors: Vec<f64> = (0..THRESHOLDS.floor_records)
             .into_par_iter()
             .filter_map(|i| {
                 let run = self.simulated(record, noise.sample(i))?;

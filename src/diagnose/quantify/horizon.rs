@@ -17,7 +17,7 @@
 
 use super::free_run::{Runner, mean, scaled, variances};
 use crate::diagnose::outcome::Horizon;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::{deviation, quantile};
@@ -122,9 +122,7 @@ pub(in crate::diagnose) fn reaches(problem: &Problem, rows: HeldOutRows<'_>) -> 
         return vec![Reach::FreeRun];
     }
     let longest = rows.record.samples() / 10;
-    let lengths = Thresholds::HORIZONS
-        .into_iter()
-        .take_while(|h| *h < longest);
+    let lengths = THRESHOLDS.horizons.into_iter().take_while(|h| *h < longest);
     let mut all: Vec<Reach> = lengths.chain([longest]).map(Reach::Samples).collect();
     all.push(Reach::FreeRun);
     all
@@ -147,14 +145,14 @@ pub(in crate::diagnose) fn compare(
     rows: HeldOutRows<'_>,
     noise: Noise,
 ) -> Result<Compared, StudyError> {
-    let simulated = simulated(draws, rows.record, Thresholds::FLOOR_RECORDS, noise);
+    let simulated = simulated(draws, rows.record, THRESHOLDS.floor_records, noise);
     let mut compared = Compared {
         horizons: vec![],
         headline: None,
         reaches: vec![],
         scale: variances(rows.record.outputs()),
     };
-    let mut clearest = Thresholds::CLEAR;
+    let mut clearest = THRESHOLDS.clear;
     for reach in reaches(&after.problem, rows) {
         let own = |p: &Predictor| p.errors(rows, reach, &compared.scale);
         let (Some(b), Some(a)) = (own(before)?, own(after)?) else {
@@ -172,7 +170,7 @@ pub(in crate::diagnose) fn compare(
         let (floor, spread) = (mean(&floors), deviation(&floors));
         let clear = (mean(&twins) - floor) / spread.max(f64::MIN_POSITIVE);
         let is_clear = clear.is_finite()
-            && clear > Thresholds::CLEAR
+            && clear > THRESHOLDS.clear
             && reach.can_measure(floor)
             && mean(&b) > floor;
         if is_clear && clear > clearest {
@@ -250,7 +248,7 @@ impl Compared {
         let Some(at) = self.headline else {
             return Ok(None);
         };
-        let records = simulated(draws, rows.record, Thresholds::SHARE_RECORDS, noise);
+        let records = simulated(draws, rows.record, THRESHOLDS.share_records, noise);
         let of = |p: &Predictor| self.means(p, self.reaches[at], rows, &records);
         let pairs: Vec<[f64; 2]> = (of(before)?.into_iter().zip(of(after)?))
             .filter_map(|(b, a)| Some([b?, a?]))
@@ -262,7 +260,7 @@ impl Compared {
             .map(|pair| share(b - pair[0] + centre[0], a - pair[1] + centre[1], floor))
             .filter(|share| share.is_finite())
             .collect();
-        let tail = 0.5 * (1.0 - Thresholds::INTERVAL_LEVEL);
+        let tail = 0.5 * (1.0 - THRESHOLDS.interval_level);
         let ends = [tail, 1.0 - tail].map(|p| quantile(&shares, p).ok());
         Ok(match ends {
             [Some(low), Some(high)] => Some([low, high]),

@@ -8,7 +8,7 @@
 //! Source of the criterion: Hunter & Reiner, "Designs for discriminating between two rival models" (1965).
 
 use crate::diagnose::outcome::NextInput;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::climb::climb;
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
@@ -45,7 +45,7 @@ pub(in crate::diagnose) fn next_input(
     class: &[&Model],
     noise: Noise,
 ) -> Result<Option<NextInput>, StudyError> {
-    let rivals: Vec<Rival> = (class.iter().take(Thresholds::MOST_RIVALS))
+    let rivals: Vec<Rival> = (class.iter().take(THRESHOLDS.most_rivals))
         .map(|model| Rival {
             key: keys(&model.terms).join("+"),
             problem: model.problem.clone(),
@@ -62,19 +62,19 @@ pub(in crate::diagnose) fn next_input(
         &rivals,
         records,
         records[0].drive(),
-        Thresholds::PROOFS,
+        THRESHOLDS.proofs,
         proof,
     )?;
     let mut best: Option<([u64; 2], Proposal)> = None;
-    for times in Thresholds::LENGTHS {
+    for times in THRESHOLDS.lengths {
         let Some(proposal) = best_of(&rivals, records, times, noise)? else {
             continue;
         };
-        let split = told_apart(&rivals, records, &proposal.drive, Thresholds::PROOFS, proof)?;
+        let split = told_apart(&rivals, records, &proposal.drive, THRESHOLDS.proofs, proof)?;
         if split[0] > best.as_ref().map_or(again[0], |(most, _)| most[0]) {
             best = Some((split, proposal));
         }
-        if 2 * split[0] > Thresholds::PROOFS {
+        if 2 * split[0] > THRESHOLDS.proofs {
             break;
         }
     }
@@ -132,7 +132,10 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
     let ranges: Vec<(f64, f64)> = (0..inputs).map(range).collect();
     // Shares of the range, by input and sample.
     let mut shapes: Vec<(String, Signal)> = vec![];
-    for hold in Thresholds::HOLDS.map(|parts| (drive.samples() / parts).max(1)) {
+    for hold in THRESHOLDS
+        .holds
+        .map(|parts| (drive.samples() / parts).max(1))
+    {
         let seconds = crate::math::six_digits(hold as f64 * dt);
         let mut source = noise.source(&format!("levels/{hold}"));
         let levels = Signal::from_shape_fn((samples.div_ceil(hold), inputs), |_| source.uniform());
@@ -159,7 +162,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
     shapes.push((
         "a staircase up and down".into(),
         Signal::from_shape_fn((samples, inputs), |(k, _)| {
-            (ramp(k) * Thresholds::STAIRS as f64).floor() / (Thresholds::STAIRS - 1) as f64
+            (ramp(k) * THRESHOLDS.stairs as f64).floor() / (THRESHOLDS.stairs - 1) as f64
         }),
     ));
     (shapes.into_iter())
@@ -227,8 +230,7 @@ fn first_statistics(rivals: &[Rival], drive: &Drive, noise: Noise) -> Result<f64
             let d = problem.dimension();
             let known = rival.information.view((0, 0), (d, d)).into_owned();
             // One rival's filter may not follow what another one made.
-            let reference = recoverable(Reference::knowing(&problem, &theta, &known))?.flatten();
-            let Some(reference) = reference else {
+            let Some(reference) = Reference::knowing(&problem, &theta, &known)? else {
                 return Ok(0.0);
             };
             least = least.min(0.5 * reference.own(&reference.direction(&own)));
@@ -259,7 +261,7 @@ fn told_apart(
                 .collect::<Result<_, StudyError>>()?;
             let others = scores.iter().enumerate().filter(|(j, _)| *j != truth);
             let next = others.map(|(_, s)| *s).fold(f64::NEG_INFINITY, f64::max);
-            Ok(scores[truth] > next + Thresholds::RIVALS)
+            Ok(scores[truth] > next + THRESHOLDS.rivals)
         })
         .collect::<Result<Vec<bool>, StudyError>>()?;
     Ok([told.iter().filter(|t| **t).count() as u64, trials])
@@ -275,7 +277,7 @@ mod tests {
         let record =
             Record::new(Drive::new(0.5, inputs).unwrap(), Signal::zeros((200, 1))).unwrap();
         let all = proposals(&record, 2, Noise::new(1, "t", 0)).unwrap();
-        assert_eq!(all.len(), 2 * Thresholds::HOLDS.len() + 2);
+        assert_eq!(all.len(), 2 * THRESHOLDS.holds.len() + 2);
         for proposal in all {
             let inputs = proposal.drive.inputs();
             for (j, (low, high)) in [(0.0, 6.0), (10.0, 16.0)].into_iter().enumerate() {

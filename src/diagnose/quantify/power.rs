@@ -10,7 +10,7 @@
 //! Sizes are linear in d⊥; of thresholds the values on the grid of the search are looked at, the mildest that shows.
 
 use crate::diagnose::outcome::Visible;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::axis::SMALL;
 use crate::fit::reference::Reference;
 use crate::hypothesis::search::model::Model;
@@ -25,12 +25,10 @@ pub(in crate::diagnose) fn power(
     model: &Model,
     terms: &[Arc<Term>],
 ) -> Result<Vec<Visible>, StudyError> {
-    let Some(reference) =
-        recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
-    else {
+    let Some(reference) = model.reference()? else {
         return Ok(vec![]);
     };
-    let need = (2.0 * Thresholds::SEEN).sqrt() + Thresholds::POWER_QUANTILE;
+    let need = (2.0 * THRESHOLDS.seen).sqrt() + THRESHOLDS.power_quantile;
     let each: Vec<(String, Visible, f64)> = (terms.par_iter())
         .map(|term| {
             let (value, distance) = smallest(model, &reference, term, need)?;

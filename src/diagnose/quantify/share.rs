@@ -3,7 +3,7 @@
 use super::free_run::{Runner, root};
 use super::horizon::{HeldOutRows, Predictor, compare};
 use crate::diagnose::outcome::Shrinkage;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::posterior::posterior;
 use crate::fit::problem::Problem;
@@ -98,7 +98,7 @@ impl<'r> HeldOut<'r> {
         let fitted = std::slice::from_ref(&refit.fitted);
         let drawn = posterior(&refit.problem, fitted, None, noise)?;
         let mut all = vec![];
-        for theta in drawn.thetas.iter().take(Thresholds::SHARE_RECORDS as usize) {
+        for theta in drawn.thetas.iter().take(THRESHOLDS.share_records as usize) {
             all.extend(self.predictor(model, refit.problem.of_record(0, theta))?);
         }
         if all.is_empty() {
@@ -237,7 +237,7 @@ pub(in crate::diagnose) fn shrinkage(
         ..alone
     };
     if let Some(horizon) = shown.map(|at| &compared.horizons[at]) {
-        let is_narrow = |[low, high]: [f64; 2]| high - low < Thresholds::WIDEST;
+        let is_narrow = |[low, high]: [f64; 2]| high - low < THRESHOLDS.widest;
         closed.metric = match horizon.samples {
             Some(_) => Shrinkage::PREDICTION,
             None => Shrinkage::FREE_RUN,
@@ -272,7 +272,7 @@ fn controls(
         return Ok(());
     }
     let mut source = noise.source("random effects");
-    for _ in 0..Thresholds::RANDOM_EFFECTS.min(wrong.len()) {
+    for _ in 0..THRESHOLDS.random_effects.min(wrong.len()) {
         let at = (source.uniform() * wrong.len() as f64) as usize;
         let drawn = wrong.swap_remove(at.min(wrong.len() - 1));
         shrinkage.random.extend(error(drawn)?);

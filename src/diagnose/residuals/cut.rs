@@ -1,6 +1,6 @@
 //! Cuts of records into windows, regions, lags and bands.
 
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::likelihood::kalman::Filtered;
 use crate::math::quantile;
 use crate::record::{Record, Signal};
@@ -105,7 +105,7 @@ impl Bins {
                 .map(Past::Output)
                 .chain((0..inputs.len()).map(Past::Input));
             bins.cuts.extend(past.flat_map(|past| {
-                Thresholds::LAG_BINS.map(|(from, to)| Cut::Lag {
+                THRESHOLDS.lag_bins.map(|(from, to)| Cut::Lag {
                     channel,
                     past,
                     from,
@@ -113,7 +113,7 @@ impl Bins {
                 })
             }));
             bins.cuts
-                .extend(Thresholds::BANDS.windows(2).map(|e| Cut::Band {
+                .extend(THRESHOLDS.bands.windows(2).map(|e| Cut::Band {
                     channel,
                     low: e[0],
                     high: e[1],
@@ -177,18 +177,18 @@ impl Bins {
 
 /// Ends of ranges with equal numbers of values.
 pub(in crate::diagnose) fn edges(values: &[f64]) -> Vec<f64> {
-    let mut edges: Vec<f64> = (0..=Thresholds::BINS)
-        .filter_map(|i| quantile(values, i as f64 / Thresholds::BINS as f64).ok())
+    let mut edges: Vec<f64> = (0..=THRESHOLDS.bins)
+        .filter_map(|i| quantile(values, i as f64 / THRESHOLDS.bins as f64).ok())
         .collect();
     edges.dedup();
     edges
 }
 
 fn windows(record: usize, channel: usize, samples: usize) -> impl Iterator<Item = Cut> {
-    (0..Thresholds::WINDOWS).map(move |w| Cut::Window {
+    (0..THRESHOLDS.windows).map(move |w| Cut::Window {
         record,
         channel,
-        from: w * samples / Thresholds::WINDOWS,
-        to: (w + 1) * samples / Thresholds::WINDOWS,
+        from: w * samples / THRESHOLDS.windows,
+        to: (w + 1) * samples / THRESHOLDS.windows,
     })
 }

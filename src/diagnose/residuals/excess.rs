@@ -1,7 +1,7 @@
 //! Statistic of each cut: departure of its innovations from white noise N(0, 1).
 
 use super::cut::{Bins, Cut, Past};
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::likelihood::kalman::Filtered;
 use crate::record::{Record, Signal};
 use rustfft::FftPlanner;
@@ -42,7 +42,7 @@ pub(in crate::diagnose) fn excess(
         .map(|(cut, sums)| match *cut {
             Cut::Channel { channel } => {
                 let of_values = level(series.sums(channel));
-                let lags = series.lags(channel, Past::Output(channel), 1, Thresholds::LAGS);
+                let lags = series.lags(channel, Past::Output(channel), 1, THRESHOLDS.lags);
                 Excess {
                     square: of_values.square + lags.square,
                     expected: of_values.expected + lags.expected,
@@ -62,7 +62,7 @@ pub(in crate::diagnose) fn excess(
 
 /// Statistic of a count, a sum and a sum of squares.
 fn level((n, sum, square): (f64, f64, f64)) -> Excess {
-    if n < Thresholds::LEAST_IN_CUT {
+    if n < THRESHOLDS.least_in_cut {
         return Excess::default();
     }
     Excess {

@@ -3,9 +3,9 @@
 use super::Search;
 use super::evidence::{Evidence, Purpose, Question};
 use super::explanations::is_noise_apart;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::hypothesis::search::explanation::Explanation;
-use crate::hypothesis::search::{Breadth, FEW};
+use crate::hypothesis::search::{Breadth, SEARCH};
 use crate::hypothesis::set::TermSet;
 
 /// Stage of a search; each ends with a step of progress.
@@ -49,7 +49,7 @@ impl<E: Evidence> Search<E> {
             Begin::Afresh => question,
             Begin::WithFits => question.with(Breadth::few),
             Begin::Carried => {
-                let best = keys(self.known.unknown().into_iter().take(FEW));
+                let best = keys(self.known.unknown().into_iter().take(SEARCH.few_functions));
                 question
                     .only(best)
                     .from(self.best_listed())
@@ -63,14 +63,14 @@ impl<E: Evidence> Search<E> {
         let all = |breadth: Breadth| breadth.for_gap(gap).of_all().afresh();
         if let Some(question) = self.ask(Purpose::Effects, TermSet::default()) {
             return Some(match self.begin {
-                Begin::Afresh if gap > Thresholds::NULL_LIKE => question.with(all),
+                Begin::Afresh if gap > SEARCH.null_like => question.with(all),
                 Begin::Afresh => question.with(|breadth| breadth.for_gap(gap)),
                 Begin::WithFits => question.with(Breadth::of_all),
                 Begin::Carried => question.only(keys(self.standing_out().into_iter())),
             });
         }
         // A fit that has nothing to answer for is where it should be.
-        let is_missed = gap <= Thresholds::NULL_LIKE && self.known.top() > Thresholds::NULL_LIKE;
+        let is_missed = gap <= SEARCH.null_like && self.known.top() > SEARCH.null_like;
         let asks = self.begin == Begin::Afresh && is_missed;
         let question = asks.then(|| self.ask(Purpose::AllEffects, TermSet::default()))??;
         Some(question.with(all))
@@ -83,7 +83,7 @@ impl<E: Evidence> Search<E> {
         let listed = self.known.listed();
         let best = listed
             .first()
-            .filter(|e| self.known.gain(e) > Thresholds::WIDER);
+            .filter(|e| self.known.gain(e) > THRESHOLDS.wider);
         let wider = best.and_then(|_| self.ask(Purpose::WiderFunctions, TermSet::default()));
         if let Some(question) = wider {
             return Some(question.from(self.best_listed()).with(Breadth::few));
@@ -94,7 +94,7 @@ impl<E: Evidence> Search<E> {
         let noise = self.known.noise();
         let likely = noise
             .first()
-            .filter(|e| self.known.gain(e) > Thresholds::NOISE);
+            .filter(|e| self.known.gain(e) > THRESHOLDS.noise);
         if let Some(question) = likely.and_then(|e| self.ask(Purpose::NoisePairs, e.set())) {
             return Some(question.with(Breadth::of_all));
         }
@@ -109,7 +109,7 @@ impl<E: Evidence> Search<E> {
         if self.begin == Begin::Carried || !self.looks_beside() {
             return None;
         }
-        let near = self.known.top() - Thresholds::CANDIDATES;
+        let near = self.known.top() - SEARCH.candidates;
         for effect in self.known.listed().into_iter().take(self.budget.singles) {
             let may_suffice = self.known.gain(effect) >= near && self.may_suffice(effect);
             if !may_suffice || self.known.suffices(effect) == Some(true) {
@@ -181,7 +181,7 @@ impl<E: Evidence> Search<E> {
             return None;
         };
         let alone = self.known.get(&TermSet::of(std::slice::from_ref(first)));
-        let least = alone.map_or(self.known.top(), |e| self.known.gain(e)) - Thresholds::RIVALS;
+        let least = alone.map_or(self.known.top(), |e| self.known.gain(e)) - THRESHOLDS.rivals;
         let rivals = (self.known.listed().into_iter())
             .filter(|e| self.known.gain(e) > least)
             .filter(|e| ![first.key(), second.key()].contains(&e.last().key()));
@@ -203,7 +203,7 @@ impl<E: Evidence> Search<E> {
         }
         let pairs = known.pairs();
         for (i, pair) in pairs.iter().take(self.budget.pairs).enumerate() {
-            let is_near = pair.log_z > pairs[0].log_z - Thresholds::CANDIDATES;
+            let is_near = pair.log_z > pairs[0].log_z - SEARCH.candidates;
             if !known.wins(pair) || i > 0 && !(is_near && self.may_suffice(pair)) {
                 break;
             }
@@ -229,7 +229,7 @@ impl<E: Evidence> Search<E> {
     /// The most probable of the best single effect and its rivals.
     fn likeliest_single(&self) -> Option<&Explanation> {
         let posterior = self.known.posterior();
-        let near = self.known.top() - Thresholds::RIVALS;
+        let near = self.known.top() - THRESHOLDS.rivals;
         let rivals = self
             .known
             .listed()
@@ -266,13 +266,13 @@ impl<E: Evidence> Search<E> {
     /// explains as much as one effect, two may explain more.
     fn looks_beside(&self) -> bool {
         !self.detection_only
-            && self.known.log_odds_alone() > Thresholds::GAP
+            && self.known.log_odds_alone() > THRESHOLDS.gap
             && self.asks_for_noise_beside().is_none()
     }
 
     /// Returns whether an explanation may leave nothing: what an unknown function alone explains better leaves something.
     fn may_suffice(&self, explanation: &Explanation) -> bool {
-        self.known.gain(explanation) > self.known.best_unknown() - Thresholds::CANDIDATES
+        self.known.gain(explanation) > self.known.best_unknown() - SEARCH.candidates
     }
 
     /// The best listed effects, from whose θ fits begin as well.

@@ -2,7 +2,7 @@
 
 use super::Search;
 use super::evidence::{Change, Evidence, Purpose};
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::hypothesis::set::TermSet;
 use crate::study::StudyError;
 
@@ -60,7 +60,7 @@ impl<E: Evidence> Search<E> {
     fn asks_for_noise(&self) -> Option<Change> {
         let alone = || {
             let best = self.known.noise().into_iter().next()?;
-            let is_enough = self.known.gain(best) > Thresholds::NOISE && !self.is_gap();
+            let is_enough = self.known.gain(best) > THRESHOLDS.noise && !self.is_gap();
             is_enough.then(|| Change::Noise(best.set()))
         };
         let noise = self.asks_for_noise_beside().or_else(alone);

@@ -1,8 +1,8 @@
 //! Interface between a search and the records: questions, changes of the twin, answers.
 
-use super::explanations::Explanations;
+use super::explanations::{Class, Explanations};
 use crate::diagnose::step::OtherStep;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::hypothesis::search::Breadth;
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::set::TermSet;
@@ -39,20 +39,12 @@ pub(in crate::diagnose) enum Purpose {
     Step,
 }
 
-/// Family of terms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::diagnose) enum Family {
-    Listed,
-    Unknown,
-    Noise,
-}
-
 /// A question: how well do a set's explanations with one more term do?
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Question {
     pub purpose: Purpose,
     pub beside: TermSet,
-    /// Keys of the terms that are asked about; all of the family if `None`.
+    /// Keys of the terms that are asked about; all of the class if `None`.
     pub only: Option<Vec<String>>,
     /// Sets from whose θ fits begin as well, and whose states functions must cover.
     pub from: Vec<TermSet>,
@@ -77,13 +69,13 @@ impl Question {
         Self { breadth, ..self }
     }
 
-    /// Family of the terms that are added.
-    pub fn family(&self) -> Family {
+    /// Class of the terms that are added.
+    pub fn class(&self) -> Class {
         use Purpose::*;
         match self.purpose {
-            Functions | WiderFunctions | Remains => Family::Unknown,
-            Effects | AllEffects | Pairs | RivalPairs | Singles | Step => Family::Listed,
-            Noise | NoisePairs | Outliers | NoiseInstead => Family::Noise,
+            Functions | WiderFunctions | Remains => Class::Unknown,
+            Effects | AllEffects | Pairs | RivalPairs | Singles | Step => Class::Listed,
+            Noise | NoisePairs | Outliers | NoiseInstead => Class::Noise,
         }
     }
 }
@@ -112,8 +104,8 @@ impl Change {
     pub fn least_gain(&self) -> f64 {
         match self {
             Self::Noise(_) => 0.0,
-            Self::Step { .. } => Thresholds::STEP_WINS,
-            Self::OwnStep => -Thresholds::STEP_WINS,
+            Self::Step { .. } => THRESHOLDS.step_wins,
+            Self::OwnStep => -THRESHOLDS.step_wins,
             // Of other records.
             Self::AllRows | Self::MoreRows => f64::NEG_INFINITY,
         }

@@ -4,8 +4,8 @@
 //! r(E) = max_U log Z(E + U) − log Z(E)     E leaves nothing to explain if r < 4
 //! ```
 
-use crate::diagnose::price::Price;
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::{Price, THRESHOLDS};
+use crate::hypothesis::search::SEARCH;
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::set::TermSet;
@@ -14,8 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Kind of term, as the answer weighs it.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Class {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::diagnose) enum Class {
     Listed,
     Unknown,
     Noise,
@@ -145,7 +145,7 @@ impl Explanations {
     /// The best pairs of listed effects.
     pub fn pairs(&self) -> Vec<&Explanation> {
         let mut pairs = self.by(&[Class::Listed, Class::Listed]);
-        pairs.truncate(Thresholds::PAIRS);
+        pairs.truncate(THRESHOLDS.pairs);
         pairs
     }
 
@@ -187,7 +187,7 @@ impl Explanations {
     /// not fitted.
     pub fn suffices(&self, explanation: &Explanation) -> Option<bool> {
         let own = self.gain(explanation);
-        let least = Thresholds::ADEQUATE.max(Thresholds::FINE_PRINT * own);
+        let least = THRESHOLDS.adequate.max(THRESHOLDS.fine_print * own);
         Some(self.left(explanation)? < least)
     }
 
@@ -205,7 +205,7 @@ impl Explanations {
     pub fn starts(&self, count: usize) -> Vec<&Explanation> {
         let all = [self.listed(), self.unknown()].into_iter();
         let best = all.flat_map(|all| all.into_iter().take(count));
-        best.filter(|e| self.gain(e) > Thresholds::BETTER).collect()
+        best.filter(|e| self.gain(e) > SEARCH.better).collect()
     }
 
     /// The fitted model that explains most, noise apart.
@@ -230,7 +230,7 @@ impl Explanations {
         let wave = (self.listed().into_iter()).find(|e| e.last().is_listed_wave());
         let wave = wave.map_or(f64::NEG_INFINITY, |e| e.log_z);
         let mut all = self.unknown();
-        all.retain(|e| e.last().nature != Nature::Periodic || e.log_z > wave + Thresholds::RIVALS);
+        all.retain(|e| e.last().nature != Nature::Periodic || e.log_z > wave + THRESHOLDS.rivals);
         all
     }
 
@@ -261,10 +261,10 @@ impl Explanations {
     /// Listed effects that may be what is missing: the best pair where it explains more than any single one, then all single ones near the
     /// best.
     pub fn candidates(&self) -> Vec<&Explanation> {
-        let near = self.top() - Thresholds::CANDIDATES;
+        let near = self.top() - SEARCH.candidates;
         let singles = self.listed().into_iter().filter(|e| self.gain(e) > near);
         let mut all: Vec<&Explanation> = self.winning_pair().into_iter().chain(singles).collect();
-        all.retain(|e| self.gain(e) > Thresholds::GAP);
+        all.retain(|e| self.gain(e) > THRESHOLDS.gap);
         all
     }
 
@@ -282,7 +282,7 @@ impl Explanations {
             }
         };
         let single = self.get(&TermSet::of(&with_noise.terms[..1]))?;
-        let is_likelier = with_noise.log_z - single.log_z > Thresholds::NOISE;
+        let is_likelier = with_noise.log_z - single.log_z > THRESHOLDS.noise;
         (is_likelier.then(|| self.get(&TermSet::of(&with_noise.terms[1..])))).flatten()
     }
 

@@ -25,10 +25,10 @@ mod explanations;
 mod setup;
 
 use self::agenda::{Begin, Stage};
-use self::budget::Budget;
+use self::budget::{BUDGET, Budget};
 use self::evidence::{Change, Evidence, Purpose};
 use super::settings::DiagnoseSettings;
-use super::thresholds::Thresholds;
+use super::thresholds::THRESHOLDS;
 use crate::hypothesis::set::TermSet;
 use crate::progress::{Cancelled, Progress};
 use crate::record::Record;
@@ -78,7 +78,7 @@ pub(in crate::diagnose) fn searched<'s>(
     watch: Watch<'s>,
 ) -> Result<Search<Setup<'s>>, StudyError> {
     let stage = watch.progress.stage("fit", 1);
-    let budget = Budget::default();
+    let budget = BUDGET;
     let setup = Setup::new(study, records.into(), watch.settings, &budget)?;
     stage.tick()?;
     search(setup, budget, watch)
@@ -256,7 +256,7 @@ impl<E: Evidence> Search<E> {
 
     /// Returns whether something is missing.
     fn is_gap(&self) -> bool {
-        self.known.posterior().log_odds > Thresholds::GAP
+        self.known.posterior().log_odds > THRESHOLDS.gap
     }
 }
 

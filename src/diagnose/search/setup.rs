@@ -1,15 +1,15 @@
 //! Evidence of explanations from the engine of hypotheses.
 
 use super::budget::Budget;
-use super::evidence::{Change, Evidence, Family, Purpose, Question};
-use super::explanations::Explanations;
+use super::evidence::{Change, Evidence, Purpose, Question};
+use super::explanations::{Class, Explanations};
 use crate::diagnose::base::Base;
 use crate::diagnose::candidates;
 use crate::diagnose::feedback::explains_noise;
 use crate::diagnose::prior::inside;
 use crate::diagnose::settings::{Ablation, DiagnoseSettings};
 use crate::diagnose::step::{OtherStep, other_step};
-use crate::diagnose::thresholds::Thresholds;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::effect::{TargetKind, targets};
 use crate::fit::Passes;
 use crate::hypothesis::noise::kinds;
@@ -126,7 +126,7 @@ impl<'s> Task<'s> {
     /// The finer step that the records ask for beside the twin alone. A gap may pass for one: an effect that is more probable, as one of all
     /// that are listed, is asked first.
     fn step_at_once(&self, base: &Base) -> Result<Option<OtherStep>, StudyError> {
-        let (model, least) = (&base.model, Thresholds::STEP_SHOWS);
+        let (model, least) = (&base.model, THRESHOLDS.step_shows);
         let asks_hold = self.study.asks_hold();
         let Some((step, gain)) = other_step(model, (least, 0.0), asks_hold)? else {
             return Ok(None);
@@ -137,7 +137,7 @@ impl<'s> Task<'s> {
             ..Breadth::of(model, self.settings.quick)
         };
         let effects = listed(model, &terms, Before::default(), breadth)?;
-        let price = (effects.len() as f64 / Thresholds::LISTED).ln();
+        let price = (effects.len() as f64 / THRESHOLDS.listed).ln();
         let best = (effects.first()).filter(|e| e.log_z - model.log_evidence - price > gain);
         match best.and_then(|effect| effect.model.as_ref()) {
             Some(beside) => Ok(other_step(beside, (least, 0.0), asks_hold)?.map(|(step, _)| step)),
@@ -272,16 +272,16 @@ impl Evidence for Setup<'_> {
         let Some(model) = known.model(&question.beside) else {
             return Ok(None);
         };
-        let (family, breadth) = (question.family(), question.breadth);
-        let terms = match family {
-            Family::Unknown => self.functions(question, known)?,
-            Family::Listed => chosen(self.listed.clone(), question),
-            Family::Noise => chosen(self.noise.clone(), question),
+        let (class, breadth) = (question.class(), question.breadth);
+        let terms = match class {
+            Class::Unknown => self.functions(question, known)?,
+            Class::Listed => chosen(self.listed.clone(), question),
+            Class::Noise => chosen(self.noise.clone(), question),
         };
-        let mut found = match family {
-            Family::Unknown => functions(model, &terms, breadth)?,
-            Family::Listed => listed(model, &terms, before(question, &terms, known), breadth)?,
-            Family::Noise => listed(model, &terms, Before::default(), breadth)?,
+        let mut found = match class {
+            Class::Unknown => functions(model, &terms, breadth)?,
+            Class::Listed => listed(model, &terms, before(question, &terms, known), breadth)?,
+            Class::Noise => listed(model, &terms, Before::default(), breadth)?,
         };
         if matches!(
             question.purpose,
@@ -343,8 +343,8 @@ impl Evidence for Setup<'_> {
         let top = known.top();
         let is_twin = beside.terms.is_empty();
         let least = match is_twin {
-            true => Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * top),
-            false => Thresholds::STEP_SHOWS,
+            true => THRESHOLDS.step_shows.max(THRESHOLDS.fine_print * top),
+            false => THRESHOLDS.step_shows,
         };
         let asks_hold = self.task.study.asks_hold();
         let finer = other_step(model, (least, top), asks_hold)?;
@@ -417,6 +417,7 @@ fn states(model: &Model) -> Result<Scales, StudyError> {
 mod tests {
     use super::*;
     use crate::diagnose::fixture::{record, tanks};
+    use crate::diagnose::search::budget::BUDGET;
     use crate::diagnose::search::{Watch, search};
     use crate::progress::Progress;
 
@@ -426,7 +427,7 @@ mod tests {
         let budget = Budget {
             long_rows: 1024,
             first_rows: 256,
-            ..Budget::default()
+            ..BUDGET
         };
         let study = tanks(budget.long_rows);
         let theta = study.twin().parameters().centre();

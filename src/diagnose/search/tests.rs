@@ -1,6 +1,7 @@
 //! The search beside a table of log Z.
 
-use super::evidence::{Family, Question};
+use super::evidence::Question;
+use super::explanations::Class;
 use super::*;
 use crate::diagnose::step::OtherStep;
 use crate::effect::Catalogue;
@@ -88,7 +89,7 @@ impl Table {
     }
 
     fn search(&self, watch: Watch<'_>) -> Result<Search<Self>, StudyError> {
-        search(self.clone(), Budget::default(), watch)
+        search(self.clone(), BUDGET, watch)
     }
 
     fn found(&self) -> Search<Self> {
@@ -118,13 +119,13 @@ impl Evidence for Table {
     ) -> Result<Option<Vec<Explanation>>, StudyError> {
         let mut asked = self.asked.lock().unwrap();
         asked.push((question.purpose, names(&question.beside)));
-        let family = match question.family() {
-            Family::Listed => "e",
-            Family::Unknown => "f",
-            Family::Noise => "n",
+        let class = match question.class() {
+            Class::Listed => "e",
+            Class::Unknown => "f",
+            Class::Noise => "n",
         };
         let beside = &known.get(&question.beside).unwrap().terms;
-        let new = self.names.iter().filter(|name| name.starts_with(family));
+        let new = self.names.iter().filter(|name| name.starts_with(class));
         let all = new.map(|name| term(name)).filter(|new| {
             let is_asked = |only: &Vec<String>| only.contains(&new.key());
             question.only.as_ref().is_none_or(is_asked)
@@ -378,7 +379,7 @@ fn a_second_effect_has_the_prior_of_something_else() {
     }
     let pairs = 0.5 * (n * (n - 1)) as f64;
     let share = pairs * (-known.price().of(2)).exp() / n as f64;
-    assert!((share - Thresholds::SECOND * Thresholds::LISTED).abs() < 1e-12);
+    assert!((share - THRESHOLDS.second * THRESHOLDS.listed).abs() < 1e-12);
     assert_eq!(known.price().of(1), 0.0);
 }
 

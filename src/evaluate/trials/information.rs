@@ -20,6 +20,7 @@
 //! taken across them: what only the noise decides, as the rounding of a sensor, then counts for nothing.
 
 use super::world::System;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::fit::axis::Axis;
 use crate::fit::climb::fit;
 use crate::fit::problem::Problem;
@@ -30,13 +31,6 @@ use crate::record::Record;
 use crate::study::Study;
 use crate::twin::{MOST_SUBSTEPS, Role, Twin};
 use nalgebra::DVector;
-
-/// Part of the weak prior that is kept: just enough for parameters that no record tells apart.
-const KNOWN: f64 = 1e-4;
-/// Substeps that stand for an exact step of the twin.
-const FINE: usize = 20;
-/// Iterations of a fit from the truth.
-const ITERATIONS: usize = 30;
 
 /// Whitened change of the innovations of two records.
 pub(super) struct InnovationChange([DVector<f64>; 2]);
@@ -124,9 +118,8 @@ impl Information {
     ) -> Result<Option<Self>, FilterError> {
         let records = std::slice::from_ref(record);
         let (problem, theta) = problem(study.twin(), study, system, records)?;
-        let known = weak(&problem) * KNOWN;
-        let Some(first) = recoverable(Reference::knowing(&problem, &theta, &known))?.flatten()
-        else {
+        let known = weak(&problem) * TRIAL.known_share;
+        let Some(first) = Reference::knowing(&problem, &theta, &known)? else {
             return Ok(None);
         };
         let Some(again) = recoverable(problem.on([again.clone()]).filtered(&theta))? else {
@@ -158,7 +151,7 @@ impl Information {
             let problem = self.problem.on(std::slice::from_ref(record));
             // Loud noise leads to a distant θ that answers a departure: quiet noise has narrow valleys.
             let starts = [self.theta.clone(), problem.begin(&self.theta)];
-            let Some(fitted) = fit(&problem, &starts, ITERATIONS)? else {
+            let Some(fitted) = fit(&problem, &starts, TRIAL.truth_iterations)? else {
                 return Ok(None);
             };
             sum += fitted.log_likelihood;
@@ -230,8 +223,8 @@ impl Information {
 
     /// Nats by which the twin's own step shows: as a departure, against twenty times as many substeps. 0 for a black box.
     pub fn step(&self, study: &Study, system: System<'_>) -> Result<f64, FilterError> {
-        let fine =
-            (study.twin()).stepped(|_, to| to.substeps = (FINE * to.substeps).min(MOST_SUBSTEPS));
+        let fine = (study.twin())
+            .stepped(|_, to| to.substeps = (TRIAL.exact_substeps * to.substeps).min(MOST_SUBSTEPS));
         let Some(fine) = fine else {
             return Ok(0.0);
         };

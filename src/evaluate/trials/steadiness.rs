@@ -59,9 +59,6 @@ pub(super) fn repeats(
         .collect()
 }
 
-/// New units in one old one: from metres to millimetres.
-const FACTOR: f64 = 1000.0;
-
 /// The study and its records with outputs in other units; `None` for a black box, and for a study with starts, effects, or noise that is
 /// to be estimated.
 pub(super) fn rescaled(
@@ -85,11 +82,14 @@ pub(super) fn rescaled(
         library: file.library.clone(),
         ..StudyFile::default()
     };
-    let twin = study.twin().with([], vec![TwinPart::Unit(FACTOR)]);
+    let twin = study
+        .twin()
+        .with([], vec![TwinPart::Unit(TRIAL.unit_factor)]);
     let new = study.with_twin(twin)?;
     let kinds = study.catalogue().kinds().iter();
     let new = new.with_effects(kinds.map(|kind| kind.as_ref().clone()));
-    let scaled = |record: &Record| Record::new(record.drive().clone(), record.outputs() * FACTOR);
+    let scaled =
+        |record: &Record| Record::new(record.drive().clone(), record.outputs() * TRIAL.unit_factor);
     let validation = validation.map(scaled).transpose()?;
     Ok(Some((new.configure(&same)?, scaled(record)?, validation)))
 }
@@ -102,7 +102,7 @@ fn noise(file: &StudyFile, outline: &Outline) -> Option<NoiseTable> {
         let NoiseLevel::Declared(declared) = &mut level else {
             return None;
         };
-        declared.std *= if is_output { FACTOR } else { 1.0 };
+        declared.std *= if is_output { TRIAL.unit_factor } else { 1.0 };
         Some((name.clone(), level))
     };
     let levels = file

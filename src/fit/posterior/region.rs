@@ -8,13 +8,6 @@ use crate::math::{principal_axes, solve_truncated};
 use crate::twin::Role;
 use nalgebra::{DMatrix, DVector};
 
-/// Length of an axis over the longest at which it is none: a start that is known, say.
-const LEAST_AXIS: f64 = 1e-9;
-
-/// Share of the draws that a top must have for the region to hold it: a 90 % interval misses a tenth. Tops along one ridge share it, and
-/// the best of them may have little of it; a far top of less mass would make the region larger than what the records leave open.
-const LEAST_SHARE: f64 = 0.05;
-
 /// Mean and principal axes of the posterior of the twin's own parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct PosteriorRegion {
@@ -38,7 +31,7 @@ impl PosteriorRegion {
         if own == 0 {
             return None;
         }
-        let least = LEAST_SHARE * draws.modes.len() as f64;
+        let least = BUDGET.least_share * draws.modes.len() as f64;
         let counts =
             |mode: usize| draws.modes.iter().filter(|m| **m == mode).count() as f64 >= least;
         let about: Vec<DVector<f64>> = (draws.thetas.iter().zip(&draws.modes))
@@ -76,7 +69,7 @@ impl PosteriorRegion {
     /// Squared distance of θ from the mean, in standard deviations: χ² of as many degrees of freedom as there are entries, for a draw.
     pub fn squared_distance(&self, theta: &[f64]) -> f64 {
         let away = DVector::from_fn(theta.len(), |j, _| theta[j] - self.theta[j]);
-        solve_truncated(&self.axes, &away, LEAST_AXIS)
+        solve_truncated(&self.axes, &away, BUDGET.least_axis)
             .map_or(f64::INFINITY, |own| own.norm_squared())
     }
 }

@@ -121,10 +121,8 @@ fn screened(problem: &Problem, noise: Noise, screen: Screen) -> Result<Vec<Vec<f
             let value = recoverable(problem.log_likelihood(&theta))?;
             Ok(value.map(|v| (v + problem.log_prior(&theta, true), theta)))
         })
-        .collect::<Result<Vec<_>, FilterError>>()?
-        .into_iter()
-        .flatten()
-        .collect();
+        .filter_map(Result::transpose)
+        .collect::<Result<_, FilterError>>()?;
     screened.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut starts: Vec<Vec<f64>> = vec![];
     for (_, theta) in screened {
@@ -158,10 +156,9 @@ pub(super) fn climbs(
     starts: &[Vec<f64>],
     iterations: usize,
 ) -> Result<Vec<Fitted>, FilterError> {
-    let fits: Vec<Option<Fitted>> = (starts.par_iter())
-        .map(|start| climb(problem, start, iterations))
+    let mut fits: Vec<Fitted> = (starts.par_iter())
+        .filter_map(|start| climb(problem, start, iterations).transpose())
         .collect::<Result<_, _>>()?;
-    let mut fits: Vec<Fitted> = fits.into_iter().flatten().collect();
     sort(&mut fits);
     Ok(fits)
 }

@@ -8,21 +8,11 @@
 //! A likelihood has a narrow top at each frequency, and few points drawn over the bounds lie near the right one; the poles of a record are
 //! found without any search.
 
+use crate::fit::budget::BUDGET;
 use crate::fit::problem::Problem;
 use crate::record::Record;
 use crate::twin::{Acting, Noise, Twin};
 use nalgebra::{Complex, DMatrix, DVector};
-
-/// Points over bounds and prior whose eigenvalues are looked at: no pass of a filter.
-const POINTS: u64 = 512;
-/// Points that become starts.
-const STARTS: usize = 2;
-/// Largest damping ratio of a pole that swings: beyond, it shows less than one cycle.
-const DAMPED: f64 = 0.6;
-/// Fastest swing that is told, in parts of half the sampling rate.
-const FASTEST: f64 = 0.8;
-/// Ridge of the regression, as a share of its mean square.
-const RIDGE: f64 = 1e-9;
 
 /// Starts at which the twin swings as the first record does, noise loud; none for a black box, or where nothing swings.
 pub(crate) fn spectral_starts(problem: &Problem) -> Vec<Vec<f64>> {
@@ -38,7 +28,7 @@ pub(crate) fn spectral_starts(problem: &Problem) -> Vec<Vec<f64>> {
         return vec![];
     }
     let (space, noise) = (problem.twin.parameters(), Noise::new(0, "spectral", 0));
-    let mut found: Vec<(f64, Vec<f64>)> = (0..POINTS)
+    let mut found: Vec<(f64, Vec<f64>)> = (0..BUDGET.spectral_points)
         .filter_map(|i| {
             let noise = noise.sample(i);
             let theta = problem.full(&match i % 2 {
@@ -56,7 +46,7 @@ pub(crate) fn spectral_starts(problem: &Problem) -> Vec<Vec<f64>> {
         })
         .collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    found.truncate(STARTS);
+    found.truncate(BUDGET.spectral_starts);
     found.into_iter().map(|(_, theta)| theta).collect()
 }
 
@@ -80,7 +70,7 @@ fn swing(record: &Record, output: usize, order: usize) -> Option<Complex<f64>> {
     });
     let target = DVector::from_iterator(rows.len(), rows.iter().map(|&k| y[k]));
     let mut gram = phi.tr_mul(&phi);
-    let ridge = RIDGE * gram.trace() / columns as f64;
+    let ridge = BUDGET.spectral_ridge * gram.trace() / columns as f64;
     (0..columns).for_each(|i| gram[(i, i)] += ridge);
     let a = gram.cholesky()?.solve(&phi.tr_mul(&target));
     let companion = DMatrix::from_fn(order, order, |i, j| match i {
@@ -91,9 +81,9 @@ fn swing(record: &Record, output: usize, order: usize) -> Option<Complex<f64>> {
     let dt = record.drive().dt();
     let poles = companion.complex_eigenvalues();
     (poles.iter())
-        .filter(|z| z.im > 0.0 && z.im.atan2(z.re) < FASTEST * std::f64::consts::PI)
+        .filter(|z| z.im > 0.0 && z.im.atan2(z.re) < BUDGET.fastest * std::f64::consts::PI)
         .map(|z| z.ln() / dt)
-        .filter(|pole| pole.re.abs() < DAMPED * pole.norm())
+        .filter(|pole| pole.re.abs() < BUDGET.damped * pole.norm())
         .min_by(|a, b| a.re.abs().total_cmp(&b.re.abs()))
 }
 

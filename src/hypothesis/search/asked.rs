@@ -4,16 +4,13 @@ use super::model::Model;
 use super::{Before, Breadth, listed};
 use crate::effect::{TargetKind, targets};
 use crate::fit::{Searched, fits};
+use crate::hypothesis::limits::SEARCH;
 use crate::hypothesis::noise::proportional;
 use crate::hypothesis::shared;
 use crate::hypothesis::term::Part;
 use crate::likelihood::Measured;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
-
-/// Nats from which another kind of noise becomes that of a fit: 20 to 1. With half of it, one record in a hundred of constant noise gets one
-/// that grows; with twice as many, a share of 5 % is missed where the signal moves by less than itself.
-const ASKED: f64 = 3.0;
 
 /// Searches with noise of outputs that grows with their signals, where the records ask for it. A pass for each output tells what it promises.
 pub(crate) fn with_asked_noise(
@@ -45,7 +42,7 @@ pub(crate) fn with_asked_noise(
     let breadth = Breadth::of(&model, false).of_all();
     while !terms.is_empty() {
         let found = listed(&model, &terms, Before::default(), breadth)?;
-        let least = model.log_evidence + ASKED;
+        let least = model.log_evidence + SEARCH.asked_noise;
         let likelier = found.into_iter().filter(|e| e.log_z > least);
         let Some(better) = likelier.filter_map(|e| e.model).next() else {
             break;

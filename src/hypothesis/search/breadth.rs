@@ -1,20 +1,7 @@
 //! Breadth of a search, and the evidence from which it becomes wider.
 
 use super::model::Model;
-
-/// Functions that are refitted, of those of one or two variables: what they promise says little of what a refit gains. With 5, the mean
-/// logarithm of the probability of the truth is −1.75 on open trials, with 12 −1.34, in 1.35 times the time.
-const FUNCTIONS: usize = 12;
-/// Functions that are refitted where it is known about what is missing.
-pub(crate) const FEW: usize = 3;
-/// Distance to the best, in nats, within which a single effect may still be the explanation.
-pub(crate) const CANDIDATES: f64 = 6.0;
-/// Evidence up to which few hypotheses are refitted: nothing seems to be missing.
-pub(crate) const NULL_LIKE: f64 = 4.0;
-/// Evidence by which a fit from elsewhere must be better to count: fits end where they promise a hundredth of it.
-pub(crate) const BETTER: f64 = 1.0;
-/// Evidence from which fits begin with loud noise, too: where much is missing, the likelihood of quiet noise has narrow valleys.
-const DEEP: f64 = 30.0;
+use crate::hypothesis::limits::SEARCH;
 
 /// Numbers of hypotheses that are refitted.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +29,7 @@ impl Breadth {
         Self {
             listed: 6,
             annealed: if few { 0 } else { usize::MAX },
-            functions: if few { 2 } else { FUNCTIONS },
+            functions: if few { 2 } else { SEARCH.functions },
             least: 2.5,
             deep: false,
             afresh: false,
@@ -53,7 +40,7 @@ impl Breadth {
     /// The same for a gap of so many nats, as unknown functions tell it.
     pub fn for_gap(self, nats: f64) -> Self {
         Self {
-            deep: nats > DEEP && self.annealed > 0,
+            deep: nats > SEARCH.deep && self.annealed > 0,
             ..self
         }
     }
@@ -78,7 +65,7 @@ impl Breadth {
     /// The same, fewer functions: where it is known about what is missing.
     pub fn few(self) -> Self {
         Self {
-            functions: FEW.min(self.functions),
+            functions: SEARCH.few_functions.min(self.functions),
             ..self
         }
     }

@@ -7,7 +7,8 @@ use crate::effect::Effect;
 use crate::fit::axis::Axis;
 use crate::fit::problem::Problem;
 use crate::fit::{Searched, fits};
-use crate::hypothesis::listed::{FREQUENCIES_PER_CYCLE, Library};
+use crate::hypothesis::limits::{SEARCH, TERM};
+use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::shared;
 use crate::hypothesis::term::{Part, Term};
@@ -17,11 +18,6 @@ use crate::record::Record;
 use crate::twin::{Noise, ParameterSpace, Role};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Highest frequency that is tried beside those of the residuals, in sampling rates.
-const HIGHEST: f64 = 0.2;
-/// Most of them; a longer record has them closer together and more of them, each of more samples.
-const MOST: usize = 2000;
 
 /// Fits a twin whose θ holds the free magnitudes of effects.
 pub(crate) fn searched(
@@ -83,8 +79,9 @@ fn own_terms(model: &Model, effects: &[Effect]) -> Result<Vec<Term>, FilterError
     let outline = model.problem.outline();
     let scales = Scales::new(&model.base, &theta, records, model.states()?, outline);
     let (dt, duration) = (scales.dt(), scales.duration());
-    let dense = (HIGHEST / dt * duration * FREQUENCIES_PER_CYCLE) as usize;
-    let dense = (2..=dense.clamp(2, MOST)).map(|i| i as f64 / (FREQUENCIES_PER_CYCLE * duration));
+    let dense = (SEARCH.highest_frequency / dt * duration * TERM.frequencies_per_cycle) as usize;
+    let dense = (2..=dense.clamp(2, SEARCH.most_frequencies))
+        .map(|i| i as f64 / (TERM.frequencies_per_cycle * duration));
     let mut all: Vec<f64> = frequencies(model)?.into_iter().chain(dense).collect();
     all.sort_by(f64::total_cmp);
     let library = Library {
@@ -94,11 +91,7 @@ fn own_terms(model: &Model, effects: &[Effect]) -> Result<Vec<Term>, FilterError
         frequencies: &all,
     };
     let terms = effects.iter().map(|effect| library.own(effect));
-    Ok(terms
-        .collect::<Result<Vec<_>, _>>()?
-        .into_iter()
-        .flatten()
-        .collect())
+    terms.filter_map(Result::transpose).collect()
 }
 
 /// The problem with all magnitudes free, and where each effect is off in it.

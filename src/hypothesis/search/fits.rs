@@ -7,6 +7,7 @@ use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
 use crate::fit::spectral_starts;
 use crate::fit::starts::{Care, search};
+use crate::hypothesis::limits::SEARCH;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Noise;
 use rayon::prelude::*;
@@ -21,17 +22,6 @@ pub(crate) struct Effort {
     pub starts: usize,
     pub iterations: usize,
 }
-
-/// Iterations at each level of held noise, and those of the free fit that follows.
-const HELD: usize = 6;
-const RELEASED: usize = 40;
-
-/// Iterations of a fit from the prior's centre, and starts of a term with a time, a delay or a shape.
-const AFRESH: usize = 10;
-const AFRESH_SHAPES: usize = 4;
-
-/// Most iterations of the fits that are carried on: they end as soon as a step promises nothing, most of them after a few.
-pub(super) const CARRIED: usize = 60;
 
 /// Fits a promise beside a model from its best starts, with θ as it answers them and with those given; `None` where it works at none.
 pub(crate) fn fit_promise(
@@ -54,8 +44,7 @@ pub(crate) fn fit_promise(
         from.extend(thetas.iter().map(|own| extended.from(own, first.clone())));
     }
     let best = fit(&extended.problem, &from, effort.iterations)?;
-    let problem = extended.problem.clone();
-    Ok(best.and_then(|fitted| extended.fitted(model.base.clone(), fitted, problem)))
+    Ok(best.and_then(|fitted| extended.fitted(model.base.clone(), fitted)))
 }
 
 /// Returns what moves a start to where θ and the size of the last term have answered its times and delays.
@@ -64,24 +53,24 @@ pub(super) fn settling_last(
     extended: &Extended,
 ) -> impl Fn(Vec<f64>) -> Result<Vec<f64>, FilterError> + use<> {
     let shape = extended.entries.get(1..).unwrap_or_default();
-    settling(problem, &|j| shape.contains(&j), HELD)
+    settling(problem, &|j| shape.contains(&j), SEARCH.held)
 }
 
 /// Fits a promise from the prior's centre with loud noise: the fit of the model alone may have gone where the term is of no use.
 pub(crate) fn fit_afresh(model: &Model, promise: &Promise) -> Result<Option<Model>, FilterError> {
     let extended = model.extend(&promise.term)?;
-    let problem = extended.problem.clone();
+    let problem = &extended.problem;
     let centre = problem.begin(&problem.centre());
     let starts = match promise.term.shape() {
-        Some(_) => AFRESH_SHAPES,
+        Some(_) => SEARCH.afresh_shapes,
         None => 1,
     };
-    let settled = settling_last(&problem, &extended);
+    let settled = settling_last(problem, &extended);
     let from: Vec<Vec<f64>> = (promise.starts.iter().take(starts))
         .map(|start| settled(model.beside_at(&extended, &centre, &start.m)))
         .collect::<Result<_, _>>()?;
-    let fitted = fit(&problem, &from, AFRESH)?;
-    Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted, problem)))
+    let fitted = fit(problem, &from, SEARCH.afresh)?;
+    Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted)))
 }
 
 /// Fits a sensor's law from where the twin without it follows the record unfolded: on each side of a fold on which the record may begin.
@@ -96,13 +85,12 @@ pub(super) fn fit_unfolded(model: &Model, promise: &Promise) -> Result<Option<Mo
         let mut initial = spectral_starts(&problem);
         initial.push(model.fitted.theta.clone());
         let noise = Noise::new(0, "unfolded", 0);
-        let fits = search(&problem, &initial, noise, RELEASED, Care::Loud)?;
+        let fits = search(&problem, &initial, noise, SEARCH.released, Care::Loud)?;
         let best = fits.first();
         from.extend(best.map(|fitted| model.beside_at(&extended, &fitted.theta, &m)));
     }
-    let fitted = fit(&extended.problem, &from, RELEASED)?;
-    let problem = extended.problem.clone();
-    Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted, problem)))
+    let fitted = fit(&extended.problem, &from, SEARCH.released)?;
+    Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted)))
 }
 
 /// The model with its noise held loud, θ fitted to that: predictions then hardly reach beyond a row, and the likelihood has no narrow
@@ -111,11 +99,13 @@ pub(crate) fn loudly(model: &Model) -> Result<Option<Model>, FilterError> {
     let is_noise = |j: usize| model.problem.axes[j].begin.is_some();
     let problem = model.problem.holding(is_noise);
     let start = problem.begin(&model.fitted.theta);
-    Ok(climb(&problem, &start, 2 * HELD)?.map(|fitted| Model {
-        problem,
-        fitted,
-        ..model.clone()
-    }))
+    Ok(
+        climb(&problem, &start, 2 * SEARCH.held)?.map(|fitted| Model {
+            problem,
+            fitted,
+            ..model.clone()
+        }),
+    )
 }
 
 /// Fits a promise beside the loud model from its best starts, the noise let down half-way to that of the model.
@@ -129,7 +119,7 @@ pub(crate) fn anneal(
     let c = &held.problem.coordinates;
     let quiet = (model.problem.coordinates).of(&model.fitted.theta);
     let loudest = (loud.problem.coordinates).of(&loud.fitted.theta);
-    let fits: Vec<Option<Fitted>> = (promise.starts.par_iter().take(starts))
+    (promise.starts.par_iter().take(starts))
         .map(|start| {
             let mut theta = begin(loud, &held, start)?;
             let mut last = None;
@@ -140,7 +130,7 @@ pub(crate) fn anneal(
                         phi[j] = (1.0 - share) * loudest[j] + share * quiet[j];
                     }
                 }
-                let Some(fitted) = climb(&held.problem, &c.theta(&phi), HELD)? else {
+                let Some(fitted) = climb(&held.problem, &c.theta(&phi), SEARCH.held)? else {
                     return Ok(None);
                 };
                 theta.clone_from(&fitted.theta);
@@ -148,8 +138,8 @@ pub(crate) fn anneal(
             }
             Ok(last)
         })
-        .collect::<Result<_, FilterError>>()?;
-    Ok(fits.into_iter().flatten().collect())
+        .filter_map(Result::transpose)
+        .collect()
 }
 
 /// Fits a promise from where its noise was let down half-way, noise free.
@@ -159,13 +149,11 @@ pub(crate) fn release(
     begun: &[Fitted],
 ) -> Result<Option<Model>, FilterError> {
     let free = model.extend(&promise.term)?;
-    let fits: Vec<Option<Fitted>> = (begun.par_iter())
-        .map(|begun| climb(&free.problem, &begun.theta, RELEASED))
+    let fits: Vec<Fitted> = (begun.par_iter())
+        .filter_map(|begun| climb(&free.problem, &begun.theta, SEARCH.released).transpose())
         .collect::<Result<_, _>>()?;
-    let best =
-        (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
-    let problem = free.problem.clone();
-    Ok(best.and_then(|fitted| free.fitted(model.base.clone(), fitted, problem)))
+    let best = (fits.into_iter()).reduce(|a, b| if b.objective > a.objective { b } else { a });
+    Ok(best.and_then(|fitted| free.fitted(model.base.clone(), fitted)))
 }
 
 /// The likeliest point on the way from the model to a start: all of it, or less where the quadratic promised too much.
@@ -213,7 +201,7 @@ pub(crate) fn fit_function(
     iterations: usize,
 ) -> Result<Option<Model>, FilterError> {
     let Linear {
-        extended,
+        mut extended,
         found,
         theta,
         ..
@@ -247,5 +235,8 @@ pub(crate) fn fit_function(
         kept = Some((value, fitted, problem.clone()));
         problem = extended.with_sizes(&found);
     }
-    Ok(kept.and_then(|(_, fitted, problem)| extended.fitted(model.base.clone(), fitted, problem)))
+    Ok(kept.and_then(|(_, fitted, problem)| {
+        extended.problem = problem;
+        extended.fitted(model.base.clone(), fitted)
+    }))
 }

@@ -10,15 +10,10 @@
 //! is the likeliest to be a motion. A record of it is one of the twin without the law, whose fit is a start beside the law.
 
 use crate::effect::{Effect, TargetKind, targets};
+use crate::hypothesis::limits::SEARCH;
 use crate::hypothesis::term::{Part, Term};
 use crate::record::{Record, Signal};
 use crate::twin::{Law, Now, Twin};
-
-/// Points at which a law is looked at, over three times what the record spans on both sides of zero.
-const POINTS: usize = 601;
-const REACH: f64 = 3.0;
-/// Most signals that are told apart at a row.
-const SIDES: usize = 4;
 
 impl Term {
     /// Magnitudes at which a sensor's law folds these records most, and the records without the fold, once for each side on which they may
@@ -42,7 +37,7 @@ impl Term {
             .map(|record| match record.has_output(output) {
                 true => unfolded(effect, &m, record, output),
                 // A record without the sensor has no fold.
-                false => vec![record.clone(); SIDES],
+                false => vec![record.clone(); SEARCH.fold_sides],
             })
             .collect();
         let sides = all.iter().map(Vec::len).min().filter(|sides| *sides > 0)?;
@@ -65,8 +60,10 @@ fn unfolded(effect: &Effect, m: &[f64], record: &Record, output: usize) -> Vec<R
     let shown = record.outputs().column(output).to_vec();
     let present: Vec<usize> = (0..shown.len()).filter(|&k| shown[k].is_finite()).collect();
     let largest = present.iter().fold(0.0, |a: f64, &k| a.max(shown[k].abs()));
-    let grid: Vec<(f64, f64)> = (0..POINTS)
-        .map(|i| REACH * largest * (2.0 * i as f64 / (POINTS - 1) as f64 - 1.0))
+    let grid: Vec<(f64, f64)> = (0..SEARCH.fold_points)
+        .map(|i| {
+            SEARCH.fold_reach * largest * (2.0 * i as f64 / (SEARCH.fold_points - 1) as f64 - 1.0)
+        })
         .map(|s| (s, law(s)))
         .collect();
     let sides: Vec<Vec<f64>> = present.iter().map(|&k| sources(&grid, shown[k])).collect();
@@ -97,7 +94,7 @@ fn sources(grid: &[(f64, f64)], y: f64) -> Vec<f64> {
         })
         .filter(|s| s.is_finite())
         .collect();
-    all.truncate(SIDES);
+    all.truncate(SEARCH.fold_sides);
     if all.is_empty() {
         let distance = |(_, shown): &&(f64, f64)| (shown - y).abs();
         let nearest = grid

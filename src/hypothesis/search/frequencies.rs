@@ -1,21 +1,16 @@
 //! Frequencies that the residuals show: where a search for a periodic effect begins.
 
 use super::model::Model;
-use crate::fit::reference::Reference;
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::hypothesis::limits::SEARCH;
+use crate::likelihood::kalman::FilterError;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
-
-/// Peaks of each periodogram.
-const PEAKS: usize = 3;
 
 /// Frequencies in Hz at which periodograms of the residuals peak: those of the innovations themselves, for what is added, and of
 /// their products with the answer to each entry of θ, for what is modulated. Up to half the sampling rate, two a cycle of the record,
 /// however long that is.
 pub(crate) fn frequencies(model: &Model) -> Result<Vec<f64>, FilterError> {
-    let Some(reference) =
-        recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
-    else {
+    let Some(reference) = model.reference()? else {
         return Ok(vec![]);
     };
     let record = &model.problem.records[0];
@@ -70,7 +65,7 @@ fn peaks(series: &[f64]) -> Vec<usize> {
         .filter(|&i| power[i] >= power[i - 1] && power[i] >= power[i + 1])
         .collect();
     tops.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
-    tops.truncate(PEAKS);
+    tops.truncate(SEARCH.peaks);
     tops
 }
 

@@ -13,7 +13,8 @@ mod screen;
 mod traces;
 mod valleys;
 
-pub(crate) use breadth::{BETTER, Breadth, CANDIDATES, FEW, NULL_LIKE};
+pub(crate) use crate::hypothesis::limits::SEARCH;
+pub(crate) use breadth::Breadth;
 pub(crate) use rivals::unknown;
 
 use crate::fit::climb::{Fitted, climb};
@@ -21,22 +22,13 @@ use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::{Term, marks};
 use crate::likelihood::kalman::FilterError;
 use explanation::{Explanation, sort};
-use fits::{CARRIED, Effort, anneal, fit_afresh, fit_promise, fit_unfolded, loudly, release};
+use fits::{Effort, anneal, fit_afresh, fit_promise, fit_unfolded, loudly, release};
 use model::Model;
 use rayon::prelude::*;
 use screen::{Promise, scan};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use valleys::leave_valleys;
-
-/// Starts of an effect with a time, a delay or a shape, each of which has a valley of its own, if it stands out. With 3, a delay beside a lag
-/// was 52 nats short on an open trial; 12 take 8 % more time in all.
-const STARTS_OF_SHAPE: usize = 12;
-/// Nats that averaging over its size takes off an effect that nothing speaks for.
-const AVERAGED: f64 = 2.0;
-
-/// Nats below the best, with noise half-way down, from which an effect is given up: loud noise makes differences smaller than they will be.
-const LOST: f64 = 25.0;
 
 /// Nats that the ways to use a hypothesis cost it, by its key: they share its prior.
 type Ways = BTreeMap<String, f64>;
@@ -141,7 +133,7 @@ pub(crate) fn listed(
         if !all.iter().any(|f| Arc::ptr_eq(f.last(), &promise.term)) {
             all.push(Explanation {
                 terms: beside(model, &promise.term),
-                log_z: floor + (promise.nats() - AVERAGED).min(-0.5),
+                log_z: floor + (promise.nats() - SEARCH.averaged).min(-0.5),
                 model: None,
             });
         }
@@ -163,18 +155,17 @@ fn first_fits(
         starts: 2,
         iterations: 6,
     };
-    let fits: Vec<Option<Model>> = (chosen.par_iter())
-        .map(|promise| fit_promise(model, promise, thetas, effort))
-        .collect::<Result<_, FilterError>>()?;
-    Ok(fits.into_iter().flatten().collect())
+    (chosen.par_iter())
+        .filter_map(|promise| fit_promise(model, promise, thetas, effort).transpose())
+        .collect()
 }
 
 /// Fits of all terms from the prior's centre and from unfolded records: beside the twin where it is, the right one may promise nothing.
 fn fresh_fits(model: &Model, promises: &[Promise]) -> Result<Vec<Model>, FilterError> {
-    let fits: Vec<Option<Model>> = (promises.par_iter())
+    (promises.par_iter())
         .flat_map_iter(|promise| [fit_afresh(model, promise), fit_unfolded(model, promise)])
-        .collect::<Result<_, FilterError>>()?;
-    Ok(fits.into_iter().flatten().collect())
+        .filter_map(Result::transpose)
+        .collect()
 }
 
 /// The same from loud noise, of the terms that promise most there. Noise is let down to that of the model for those that are near the best by
@@ -195,20 +186,19 @@ fn annealed_fits(
     let best = (begun.iter().flatten())
         .map(|fitted| fitted.objective)
         .fold(f64::NEG_INFINITY, f64::max);
-    let fits: Vec<Option<Model>> = (promises.par_iter().zip(begun))
-        .map(|(promise, mut begun)| {
-            begun.retain(|fitted| fitted.objective > best - LOST);
-            release(model, promise, &begun)
+    (promises.par_iter().zip(begun))
+        .filter_map(|(promise, mut begun)| {
+            begun.retain(|fitted| fitted.objective > best - SEARCH.lost);
+            release(model, promise, &begun).transpose()
         })
-        .collect::<Result<_, FilterError>>()?;
-    Ok(fits.into_iter().flatten().collect())
+        .collect()
 }
 
 /// Gives those near the best more starts, and carries them on.
 fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Result<(), FilterError> {
     let floor = model.log_evidence;
     let top = all.first().map_or(floor, |f| f.log_z);
-    let is_near = |i: usize, log_z: f64| i < 5 || log_z > top - CANDIDATES;
+    let is_near = |i: usize, log_z: f64| i < 5 || log_z > top - SEARCH.candidates;
     let is_worth = |i: usize, log_z: f64| i < 2 || log_z > floor + 1.0;
     let best: Vec<Vec<f64>> = all
         .iter()
@@ -227,7 +217,7 @@ fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Resul
                 .collect();
             let effort = Effort {
                 starts: match found.last().shape() {
-                    Some(_) => STARTS_OF_SHAPE,
+                    Some(_) => SEARCH.starts_of_shape,
                     None => 3,
                 },
                 iterations: 12,
@@ -238,7 +228,7 @@ fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Resul
                 None => None,
             };
             let carried = match &found.model {
-                Some(m) => climb(&m.problem, &m.fitted.theta, CARRIED)?
+                Some(m) => climb(&m.problem, &m.fitted.theta, SEARCH.carried)?
                     .and_then(|fitted| m.refitted(fitted)),
                 None => None,
             };

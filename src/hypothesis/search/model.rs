@@ -4,14 +4,13 @@ use crate::fit::axis::{EvidencePrior, Family};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::{CREDIT, Laplace, laplace};
 use crate::fit::problem::Problem;
+use crate::fit::reference::Reference;
+use crate::hypothesis::limits::SEARCH;
 use crate::hypothesis::term::{Term, marks, with_terms};
 use crate::likelihood::kalman::FilterError;
 use crate::record::Signal;
 use crate::twin::Twin;
 use std::sync::Arc;
-
-/// Iterations of a fit that is carried on to its end.
-const TO_THE_END: usize = 40;
 
 /// A twin with terms, fitted.
 #[derive(Clone)]
@@ -90,6 +89,11 @@ impl Model {
         Ok(all.into_iter().map(|(_, states)| states).collect())
     }
 
+    /// Innovations, and what θ answers; `None` where the filter does not work.
+    pub fn reference(&self) -> Result<Option<Reference>, FilterError> {
+        Reference::new(&self.problem, &self.fitted.theta)
+    }
+
     /// The model with one more term.
     pub fn extend(&self, term: &Arc<Term>) -> Result<Extended, FilterError> {
         self.extend_by(std::slice::from_ref(term))
@@ -132,7 +136,7 @@ impl Model {
 
     /// The model fitted to the end of a climb: a search stops before.
     pub fn carried_on(&self) -> Result<Option<Self>, FilterError> {
-        let fitted = climb(&self.problem, &self.fitted.theta, TO_THE_END)?;
+        let fitted = climb(&self.problem, &self.fitted.theta, SEARCH.to_the_end)?;
         Ok(fitted.and_then(|fitted| self.refitted(fitted)))
     }
 
@@ -140,9 +144,8 @@ impl Model {
     pub fn beside_twin(&self, base: &Model) -> Result<Option<Model>, FilterError> {
         let extended = base.extend_by(&self.terms)?;
         let start = extended.problem.carried(&self.problem, &self.fitted.theta);
-        let fitted = climb(&extended.problem, &start, TO_THE_END)?;
-        let problem = extended.problem.clone();
-        Ok(fitted.and_then(|fitted| extended.fitted(base.base.clone(), fitted, problem)))
+        let fitted = climb(&extended.problem, &start, SEARCH.to_the_end)?;
+        Ok(fitted.and_then(|fitted| extended.fitted(base.base.clone(), fitted)))
     }
 
     /// Full θ of the extended model where the new term has these magnitudes.
@@ -192,8 +195,8 @@ impl Extended {
     }
 
     /// The fitted model.
-    pub fn fitted(self, base: Twin, fitted: Fitted, problem: Problem) -> Option<Model> {
-        Model::new(base, self.terms, problem, fitted, self.by_bic)
+    pub fn fitted(self, base: Twin, fitted: Fitted) -> Option<Model> {
+        Model::new(base, self.terms, self.problem, fitted, self.by_bic)
     }
 }
 

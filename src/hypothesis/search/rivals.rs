@@ -4,19 +4,17 @@ use super::breadth::Breadth;
 use super::explanation::Explanation;
 use super::fits::{Effort, fit_function, fit_promise};
 use super::model::Model;
-use super::screen::{functions, reference, scan_from};
+use super::screen::{functions, scan_from};
 use super::traces::screened;
 use super::{beside, merged, ways};
 use crate::fit::evidence::log_mean;
 use crate::fit::reference::Reference;
+use crate::hypothesis::limits::SEARCH;
 use crate::hypothesis::term::{Nature, Term};
 use crate::likelihood::kalman::FilterError;
 use crate::math::median;
 use rayon::prelude::*;
 use std::sync::Arc;
-
-/// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
-const PRICE_OF_FREQUENCY: f64 = 2.5;
 
 /// A hypothesis before it is weighed against others: its terms, its nats, and its fit where it was worth one.
 type Weighed = (Vec<Arc<Term>>, f64, Option<Model>);
@@ -38,12 +36,17 @@ pub(crate) fn unknown(
         functions,
         ..breadth
     };
-    let reference = reference(model)?;
+    let reference = model.reference()?;
     let pasts = screened(model, reference.as_ref(), of(Nature::Past), with(few + 1))?;
     let mut all = vec![
         weighed(model, &of(Nature::Function), 0.0, breadth)?,
         weighed(model, &of(Nature::Reading), 0.0, with(half))?,
-        weighed(model, &of(Nature::Periodic), PRICE_OF_FREQUENCY, with(half))?,
+        weighed(
+            model,
+            &of(Nature::Periodic),
+            SEARCH.price_of_frequency,
+            with(half),
+        )?,
     ];
     let mut own = weighed(model, &pasts.kept, 0.0, with(few))?;
     let others = pasts.others.iter();

@@ -44,19 +44,13 @@ impl Promise {
 
 /// Promises of terms beside a model, best first; terms that nothing can be told of are left out.
 pub(crate) fn scan(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Promise>, FilterError> {
-    match reference(model)? {
+    match model.reference()? {
         Some(reference) => scan_from(model, &reference, terms),
         None => Ok(vec![]),
     }
 }
 
-/// Innovations of a model, and what its θ answers; `None` where the filter does not work beside it.
-pub(crate) fn reference(model: &Model) -> Result<Option<Reference>, FilterError> {
-    let reference = Reference::new(&model.problem, &model.fitted.theta);
-    Ok(recoverable(reference)?.flatten())
-}
-
-/// The same with the innovations at hand.
+/// As [`scan`] with the innovations at hand.
 pub(crate) fn scan_from(
     model: &Model,
     reference: &Reference,
@@ -67,10 +61,8 @@ pub(crate) fn scan_from(
             let extended = model.extend(term)?;
             let mut starts: Vec<Beginning> = (term.starts.par_iter())
                 .map(|start| promise(model, reference, &extended, start))
-                .collect::<Result<Vec<_>, FilterError>>()?
-                .into_iter()
-                .flatten()
-                .collect();
+                .filter_map(Result::transpose)
+                .collect::<Result<_, FilterError>>()?;
             starts.sort_by(|a, b| b.nats.total_cmp(&a.nats));
             Ok(Promise {
                 term: term.clone(),
@@ -170,10 +162,8 @@ pub(crate) fn functions(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Linear
                 theta,
             }))
         })
-        .collect::<Result<Vec<_>, FilterError>>()?
-        .into_iter()
-        .flatten()
-        .collect();
+        .filter_map(Result::transpose)
+        .collect::<Result<_, FilterError>>()?;
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Ok(all)
 }

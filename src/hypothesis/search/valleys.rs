@@ -1,30 +1,13 @@
 //! Effects whose time, delay or frequency ended in a valley of its own.
 
-use super::breadth::{BETTER, CANDIDATES, NULL_LIKE};
 use super::explanation::Explanation;
-use super::fits::{CARRIED, settling_last};
+use super::fits::settling_last;
 use super::model::Model;
 use crate::fit::climb::{Fitted, climb, fit};
-use crate::hypothesis::magnitude::TIMES;
+use crate::hypothesis::limits::{SEARCH, TERM};
 use crate::hypothesis::term::Term;
 use crate::likelihood::kalman::FilterError;
 use rayon::prelude::*;
-
-/// Places from which the same law begins again elsewhere.
-const PLACES: usize = 2;
-/// Iterations before a new start is compared with the old end.
-const ITERATIONS: usize = 12;
-/// Samples of the first move of a time or a delay, doubled up to a quarter of the distance between the times that are tried: the likelihood
-/// has a kink at each sample, and θ moves with the time.
-const MOVE: f64 = 0.5;
-/// Most times that the best effects move on.
-const ROUNDS: usize = 6;
-
-/// Times in place of one that was tried first, where the same law explains more at another place: a peak of the likelihood can be a
-/// fortieth of the record wide. Half as many miss it, twice as many cost as much again as the rest of the fit.
-const CLOSER: usize = 4;
-/// Iterations with which θ and the size answer a time, beginning with the answer to the one before.
-const ANSWERS: usize = 3;
 
 /// θ of the twin and magnitudes.
 type Start = (Vec<f64>, Vec<f64>);
@@ -37,7 +20,7 @@ pub(super) fn leave_valleys(
     floor: f64,
 ) -> Result<(), FilterError> {
     let top = all.first().map_or(floor, |f| f.log_z);
-    let least = (top - CANDIDATES).max(floor + NULL_LIKE);
+    let least = (top - SEARCH.candidates).max(floor + SEARCH.null_like);
     let better: Vec<Option<Explanation>> = (0..all.len())
         .into_par_iter()
         .map(|i| again(model, &all[i], &all[..i], least))
@@ -65,7 +48,7 @@ fn again(
         .filter(|other| other.log_z > least && other.last().shape().as_ref() == Some(&shape))
         .filter_map(|other| Some((other.own_theta()?, other.magnitudes()?)));
     let mut starts: Vec<Start> = vec![];
-    for (theta, m) in alike.take(PLACES) {
+    for (theta, m) in alike.take(SEARCH.places) {
         if term.starts.iter().all(|start| start.scales) {
             let mut opposite = m.clone();
             opposite[0] = -opposite[0];
@@ -84,12 +67,12 @@ fn again(
         return Ok(None);
     }
     let mut best = begun_again(model, found, &starts)?;
-    for _ in 1..ROUNDS {
+    for _ in 1..SEARCH.rounds {
         let Some(old) = best.as_ref().filter(|old| old.log_z > least) else {
             break;
         };
         let next = begun_again(model, old, &nearby(old, term))?;
-        match next.filter(|next| next.log_z > old.log_z + BETTER) {
+        match next.filter(|next| next.log_z > old.log_z + SEARCH.better) {
             Some(next) => best = Some(next),
             None => break,
         }
@@ -111,11 +94,11 @@ fn begun_again(
     let from: Vec<Vec<f64>> = (starts.iter())
         .map(|(theta, m)| settled(extended.from(theta, model.beside(&extended, m))))
         .collect::<Result<_, _>>()?;
-    let begun = fit(&own.problem, &from, ITERATIONS)?;
+    let begun = fit(&own.problem, &from, SEARCH.begun_again)?;
     let Some(begun) = begun.filter(|begun| begun.objective > own.fitted.objective) else {
         return Ok(None);
     };
-    let carried = climb(&own.problem, &begun.theta, CARRIED)?;
+    let carried = climb(&own.problem, &begun.theta, SEARCH.carried)?;
     let better = own.refitted(carried.unwrap_or(begun));
     Ok(better.map(|m| Explanation {
         terms: m.terms.clone(),
@@ -134,11 +117,11 @@ fn between(model: &Model, found: &Explanation) -> Result<Option<Start>, FilterEr
     let time = extended.entries[time];
     let held = own.problem.holding(|j| j == time);
     let record = &own.problem.records[0];
-    let (count, mut theta) = (CLOSER * (TIMES + 1), own.fitted.theta.clone());
+    let (count, mut theta) = (SEARCH.closer * (TERM.times + 1), own.fitted.theta.clone());
     let mut best: Option<Fitted> = None;
     for i in 1..count {
         theta[time] = record.drive().dt() * (record.samples() * i) as f64 / count as f64;
-        if let Some(fitted) = climb(&held, &theta, ANSWERS)? {
+        if let Some(fitted) = climb(&held, &theta, SEARCH.answers)? {
             theta.clone_from(&fitted.theta);
             if best
                 .as_ref()
@@ -163,10 +146,11 @@ fn nearby(found: &Explanation, term: &Term) -> Vec<Start> {
         return vec![];
     };
     let record = &model.problem.records[0];
-    let longest = 0.25 * record.samples() as f64 / (TIMES + 1) as f64;
-    let moves: Vec<f64> = std::iter::successors(Some(MOVE), |samples| Some(2.0 * samples))
-        .take_while(|samples| *samples <= longest.max(2.0 * MOVE))
-        .collect();
+    let longest = 0.25 * record.samples() as f64 / (TERM.times + 1) as f64;
+    let moves: Vec<f64> =
+        std::iter::successors(Some(SEARCH.first_move), |samples| Some(2.0 * samples))
+            .take_while(|samples| *samples <= longest.max(2.0 * SEARCH.first_move))
+            .collect();
     let mut all = vec![];
     for i in term.kinked() {
         for samples in moves.iter().flat_map(|samples| [-samples, *samples]) {

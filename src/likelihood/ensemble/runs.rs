@@ -26,12 +26,11 @@ impl Ensemble {
     ) -> Result<Self, SimulationError> {
         drive.check_uniform().map_err(SimulationError::of)?;
         let noise = Noise::new(0, "ensemble", 0);
-        let runs: Vec<Option<Signal>> = (0..RUNS)
+        let runs: Vec<Signal> = (0..RUNS)
             .into_par_iter()
             .with_min_len(AT_ONCE)
-            .map(|i| run(twin, theta, drive, noise.sample(i as u64)))
+            .filter_map(|i| run(twin, theta, drive, noise.sample(i as u64)).transpose())
             .collect::<Result<_, _>>()?;
-        let runs: Vec<Signal> = runs.into_iter().flatten().collect();
         if runs.len() < RUNS / 2 {
             return Err(SimulationError::Diverged { at: drive.time(0) });
         }

@@ -13,14 +13,14 @@
 
 mod level;
 mod motion;
-mod share;
 mod start;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use level::{Beliefs, Level, Measured, StartElsewhere};
-pub(crate) use share::{LARGEST_SHARE, share_name, with_share};
-pub(crate) use start::STANDS;
+pub(crate) use level::{
+    Beliefs, LARGEST_SHARE, Level, Measured, StartElsewhere, share_name, with_share,
+};
+pub(crate) use start::with_better_start;
 
 use super::ensemble;
 use super::kalman::FilterError;

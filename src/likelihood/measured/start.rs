@@ -18,9 +18,22 @@ use crate::twin::{Acting, Composed, Now, Role, is_memory};
 const ELSEWHERE: f64 = 5.0;
 /// Nats by which records must be better explained with a start that their first rows contradict for it to stand: something is then missing that bends
 /// these rows, with prior odds of 1 to 20. With twice of it an offset of a sensor, better by 5.8, passes for a force.
-pub(crate) const STANDS: f64 = 3.0;
+const STANDS: f64 = 3.0;
 /// Median absolute second difference of white noise, in its standard deviations: 0.6745·√6.
 const SECOND_DIFFERENCE: f64 = 1.652;
+
+/// The better of two results where records contradict a start that the twin's code says: the one with that start given up, or the one of `again`
+/// with it held; and whether it is held. What is missing may bend the reading of a start, as an offset does.
+pub(crate) fn with_better_start<R, E>(
+    given_up: R,
+    nats: impl Fn(&R) -> Option<f64>,
+    again: impl FnOnce() -> Result<R, E>,
+) -> Result<(R, bool), E> {
+    let held = again()?;
+    let stands =
+        (nats(&held).zip(nats(&given_up))).is_some_and(|(held, other)| held - other > STANDS);
+    Ok((if stands { held } else { given_up }, stands))
+}
 
 /// Starts of a twin in these records.
 pub(super) struct Starts {

@@ -1,5 +1,6 @@
 //! Damaged channels: constant, clipped, quantised, with outliers.
 
+use super::limits::LIMITS;
 use super::{or_pass, present, text, with_unit};
 use crate::effect::{OutputMark, clipped, rounded};
 use crate::math::{CONSTANT, ends, is_constant, median, quantile};
@@ -7,24 +8,10 @@ use crate::record::{Drive, Record, Signal};
 use crate::study::Study;
 use crate::twin::conformance::Finding;
 
-/// Levels within the range of a channel below which rounding shapes it: with 50, rounding adds 2 % of the range to each row, as much as
-/// the noise of a common sensor.
-const FEW_LEVELS: f64 = 50.0;
-/// Distance from the neighbours, in deviations of the noise, that noise does not reach: 36 right records of the reference twins and of
-/// two tanks have none, an outlier of 6 V in two tanks lies at 30.
-const OUTLYING: f64 = 7.0;
-/// Least deviation of the noise, as a share of the channel's own: curvature of a smooth signal.
-const SMOOTH: f64 = 0.02;
-/// Neighbours on each side: one outlier more than it may come in a row.
-const SIDE: usize = 2;
-/// Fewest values that outliers are looked for among.
-const FEWEST: usize = 50;
 /// Interquartile range of a normal distribution, in standard deviations.
 const QUARTILES: f64 = 1.349;
 /// Standard deviation of a normal distribution, in median absolute deviations.
 const MEDIANS: f64 = 1.4826;
-/// Rows that a message names.
-const NAMED: usize = 5;
 
 /// Checks each channel; what the twin's own run shows, too, is no fault.
 pub(super) fn check(
@@ -82,7 +69,8 @@ pub(super) fn check(
             warn(
                 "quantised",
                 format!(
-                    "output {name} moves in steps of {step}, fewer than {FEW_LEVELS} in its range; log more digits, or add the effect sensor-quantization"
+                    "output {name} moves in steps of {step}, fewer than {} in its range; log more digits, or add the effect sensor-quantization",
+                    LIMITS.few_levels
                 ),
             );
         }
@@ -90,10 +78,14 @@ pub(super) fn check(
         let usual = own.map_or(0, |own| self::outliers(&own).len());
         if outliers.len() > 2 * usual {
             let largest = outliers.iter().map(|(_, z)| *z).fold(0.0, f64::max);
-            let named: Vec<String> = (outliers.iter().take(NAMED))
+            let named: Vec<String> = (outliers.iter().take(LIMITS.named))
                 .map(|(at, _)| record.drive().lines().line(rows[*at]).to_string())
                 .collect();
-            let more = if outliers.len() > NAMED { ", …" } else { "" };
+            let more = if outliers.len() > LIMITS.named {
+                ", …"
+            } else {
+                ""
+            };
             warn(
                 "outliers",
                 format!(
@@ -132,13 +124,13 @@ fn coarse_step(values: &[f64]) -> Option<f64> {
         return None;
     };
     let (low, high) = ends(values);
-    (high - low < FEW_LEVELS * steps[0]).then_some(steps[0])
+    (high - low < LIMITS.few_levels * steps[0]).then_some(steps[0])
 }
 
 /// Values far outside their neighbours, with the distance in deviations of the noise. Two neighbours on each side, without the least
 /// and the greatest, span the range, so that edges are no outliers; the ends of the record have too few.
 fn outliers(values: &[f64]) -> Vec<(usize, f64)> {
-    if values.len() < FEWEST {
+    if values.len() < LIMITS.fewest {
         return vec![];
     }
     // Values that stand still, as at an end of the range, tell nothing of noise.
@@ -147,16 +139,16 @@ fn outliers(values: &[f64]) -> Vec<(usize, f64)> {
         .filter(|distance| *distance > 0.0)
         .collect();
     let quartile = |p: f64| quantile(values, p).unwrap_or(0.0);
-    let least = SMOOTH * (quartile(0.75) - quartile(0.25)) / QUARTILES;
+    let least = LIMITS.smooth * (quartile(0.75) - quartile(0.25)) / QUARTILES;
     let noise = least.max(MEDIANS * median(&moves).unwrap_or(0.0) / 2f64.sqrt());
-    (values.windows(2 * SIDE + 1).zip(SIDE..))
+    (values.windows(2 * LIMITS.side + 1).zip(LIMITS.side..))
         .map(|(near, k)| {
             let mut others = [near[0], near[1], near[3], near[4]];
             others.sort_unstable_by(f64::total_cmp);
-            let outside = (near[SIDE] - others[2]).max(others[1] - near[SIDE]);
+            let outside = (near[LIMITS.side] - others[2]).max(others[1] - near[LIMITS.side]);
             (k, outside / noise)
         })
-        .filter(|(_, z)| *z > OUTLYING)
+        .filter(|(_, z)| *z > LIMITS.outlying)
         .collect()
 }
 

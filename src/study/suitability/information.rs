@@ -1,5 +1,6 @@
 //! Expected errors of parameters, from the likelihood's information.
 
+use super::limits::LIMITS;
 use crate::fit::climb::climb;
 use crate::fit::problem::Problem;
 use crate::likelihood::measured;
@@ -8,10 +9,6 @@ use crate::study::Study;
 use crate::twin::conformance::Finding;
 use crate::twin::{PRIOR_DEVIATION, Role};
 use serde::Serialize;
-
-/// Times that an error must exceed that of a planned record before the record is blamed. Planned records of the tanks differ among
-/// themselves by up to 2.
-const WORSE: f64 = 2.5;
 
 /// Expected error of a parameter.
 #[derive(Debug, Clone, Serialize)]
@@ -48,7 +45,7 @@ pub(super) fn check(
     let unknown = |p: &&Knowable| p.share.is_nan() || p.share >= PRIOR_DEVIATION;
     let is_blamed = |p: &Knowable| {
         p.planned_share
-            .is_none_or(|usual| p.share.is_nan() || p.share > WORSE * usual)
+            .is_none_or(|usual| p.share.is_nan() || p.share > LIMITS.worse * usual)
     };
     let listed = |chosen: &dyn Fn(&&Knowable) -> bool| -> Vec<String> {
         (parameters.iter().filter(|p| chosen(p)))

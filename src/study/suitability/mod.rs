@@ -13,6 +13,7 @@
 
 mod channels;
 mod information;
+mod limits;
 mod size;
 mod swapped;
 mod time;
@@ -27,12 +28,7 @@ use crate::record::{Drive, Quantity, Record, Signal};
 use crate::setting::number;
 use crate::twin::Noise;
 use crate::twin::conformance::{Finding, Severity};
-
-/// Runs of the twin at draws of its prior, beside the one at the centre: one of them is near enough to any point of the prior for a
-/// comparison of sizes and shapes, and a slow simulator still answers within a minute or so.
-const DRAWS: u64 = 24;
-/// Samples that are looked at, at most: statistics of longer records say nothing new, and runs of the twin take time.
-const LOOKED_AT: usize = 20_000;
+use limits::LIMITS;
 
 /// Findings about a record and a twin.
 #[derive(Debug)]
@@ -76,9 +72,9 @@ impl Study {
         }
         let mut findings = described(record, &self.twin.signals().outputs);
         // A channel may have no value at the beginning; the whole record has one.
-        let begin = record.first_part(record.samples().min(LOOKED_AT));
+        let begin = record.first_part(record.samples().min(LIMITS.looked_at));
         let record = begin.unwrap_or_else(|| record.clone());
-        let stage = progress.stage("runs", DRAWS as usize + 4);
+        let stage = progress.stage("runs", LIMITS.draws as usize + 4);
         // A plan without inputs is no fault of the record.
         let planned = (self.drives().ok()).and_then(|drives| drives.draw(noise).ok());
         let planned = planned.and_then(|drive| self.planned(drive, noise));
@@ -94,7 +90,7 @@ impl Study {
         // With noise, at the centre of the prior and at draws of it; those that diverge are left out.
         let (mut centre, mut runs) = (None, vec![]);
         let space = self.twin.parameters();
-        for draw in 0..=DRAWS {
+        for draw in 0..=LIMITS.draws {
             let noise = noise.sample(draw);
             let theta = match draw {
                 0 => space.centre(),
@@ -132,7 +128,7 @@ impl Study {
 
     /// A record as the plan has them, simulated at the centre of the prior.
     fn planned(&self, drive: Drive, noise: Noise) -> Option<Record> {
-        let drive = drive.first(LOOKED_AT);
+        let drive = drive.first(LIMITS.looked_at);
         let theta = self.twin.parameters().centre();
         let outputs = self.twin.simulate(&theta, &drive, noise).ok()?;
         Record::complete(drive, outputs).ok()

@@ -1,24 +1,14 @@
 //! Inputs outside the plan, and units that are off by a power of ten.
 
+use super::limits::LIMITS;
 use super::{or_pass, present, text, with_unit};
 use crate::math::{deviation, ends, largest, median};
 use crate::record::{Drive, Record, RecordError, Signal};
 use crate::study::Study;
 use crate::twin::conformance::Finding;
 
-/// Share of the planned range that an input may leave it by: the accuracy of an actuator.
-const MARGIN: f64 = 0.05;
-/// Powers of ten that a unit may be off by: mega to micro, in one.
-const POWERS: i32 = 6;
 /// Share of the largest planned input that the largest one of a record reaches in the right unit.
 const REACHED: (f64, f64) = (0.3, 1.05);
-/// Times that an output is larger or smaller than in any run of the twin before its unit is doubted. In 30 simulated records of two tanks
-/// outputs left the range of the runs by 1.12 at most.
-const DOUBTED: f64 = 2.5;
-/// The same where no power of ten explains it.
-const UNLIKE: f64 = 6.0;
-/// Times that the deviation of an output in the right unit may leave the range of the runs by.
-const USUAL: f64 = 2.0;
 
 /// Checks inputs against the plan; also returns the power of ten that each is too large by.
 pub(super) fn check_inputs(
@@ -48,7 +38,7 @@ pub(super) fn check_inputs(
         );
         let reach = largest(&values) / low.abs().max(high.abs());
         let in_reach = |factor: &f64| (REACHED.0..=REACHED.1).contains(&(reach / factor));
-        let is_doubted = !(REACHED.0 / DOUBTED..=DOUBTED).contains(&reach);
+        let is_doubted = !(REACHED.0 / LIMITS.doubted..=LIMITS.doubted).contains(&reach);
         if is_doubted && let Some(factor) = powers().find(in_reach) {
             let message = format!("{given}; {} if the unit differs", conversion(factor));
             findings.push(Finding::warning("scale", message));
@@ -57,7 +47,7 @@ pub(super) fn check_inputs(
         }
         // Of an input that is to stay, the accuracy is a share of its value.
         let extent = if high > low { high - low } else { high.abs() };
-        let margin = MARGIN * extent;
+        let margin = LIMITS.margin * extent;
         let range = low - margin..=high + margin;
         let outside = values.iter().filter(|v| !range.contains(v)).count();
         if outside > 0 {
@@ -90,7 +80,7 @@ pub(super) fn check_outputs(
         let sizes: Vec<f64> = sizes.collect();
         let (low, high) = ends(&sizes);
         let beyond = |size: f64, times: f64| size > times * high || size < low / times;
-        if own == 0.0 || low == 0.0 || !beyond(own, DOUBTED) {
+        if own == 0.0 || low == 0.0 || !beyond(own, LIMITS.doubted) {
             continue;
         }
         let Ok(middle) = median(&sizes) else {
@@ -98,14 +88,14 @@ pub(super) fn check_outputs(
         };
         let off = |factor: &f64| (own / factor / middle).ln().abs();
         let nearest = powers()
-            .filter(|factor| !beyond(own / factor, USUAL))
+            .filter(|factor| !beyond(own / factor, LIMITS.usual))
             .min_by(|a, b| off(a).total_cmp(&off(b)));
         let remedy = match nearest {
             Some(factor) => format!(
                 "{} if the unit differs, or else widen the prior",
                 conversion(factor)
             ),
-            None if beyond(own, UNLIKE) => {
+            None if beyond(own, LIMITS.unlike) => {
                 "check its unit, and widen the prior if the unit is right".into()
             }
             None => continue,
@@ -126,7 +116,7 @@ pub(super) fn check_outputs(
 
 /// Factors that a unit may be off by, the nearest first.
 fn powers() -> impl Iterator<Item = f64> {
-    (1..=POWERS).flat_map(|n| [10f64.powi(n), 10f64.powi(-n)])
+    (1..=LIMITS.powers).flat_map(|n| [10f64.powi(n), 10f64.powi(-n)])
 }
 
 /// The remedy for values that are too large by a factor.

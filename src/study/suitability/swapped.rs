@@ -1,15 +1,10 @@
 //! Swapped outputs.
 
+use super::limits::LIMITS;
 use crate::math::correlation;
 use crate::record::{Record, RecordError, Signal};
 use crate::study::Study;
 use crate::twin::conformance::Finding;
-
-/// Correlation with another output's run that a swapped output has at least.
-const ALIKE: f64 = 0.5;
-/// Times that what is left unexplained, 1 − r, must be smaller for two outputs in the other order, as a geometric mean. In 30 simulated
-/// records of two tanks the right order was better by 3.5 to 27; at 4, swapped ones are missed.
-const BETTER: f64 = 2.0;
 
 /// Checks whether two outputs look more like each other's runs; also returns the order that they seem to have.
 pub(super) fn check(study: &Study, record: &Record, runs: &[Signal]) -> (Vec<Finding>, Vec<usize>) {
@@ -29,7 +24,9 @@ pub(super) fn check(study: &Study, record: &Record, runs: &[Signal]) -> (Vec<Fin
             let (own, other) = ([most(i, i), most(j, j)], [most(i, j), most(j, i)]);
             let left =
                 |r: [f64; 2]| (1.0 - r[0]).max(f64::EPSILON) * (1.0 - r[1]).max(f64::EPSILON);
-            if other.iter().all(|r| *r > ALIKE) && left(other) * BETTER.powi(2) < left(own) {
+            if other.iter().all(|r| *r > LIMITS.alike)
+                && left(other) * LIMITS.better.powi(2) < left(own)
+            {
                 let (a, b) = (&outputs[i].name, &outputs[j].name);
                 findings.push(Finding::warning(
                     "swapped",

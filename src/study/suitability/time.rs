@@ -1,5 +1,6 @@
 //! Units of time, steps, sampling, length.
 
+use super::limits::LIMITS;
 use super::size::conversion;
 use super::{or_pass, text};
 use crate::record::{Drive, Record, RecordError};
@@ -15,12 +16,6 @@ const UNITS: [(f64, &str); 6] = [
     (1.0 / 3600.0, "hours"),
     (1.0 / 86_400.0, "days"),
 ];
-/// Largest ratio of a step to the plan's, in the right unit: records are seldom sampled quite as planned, and units differ by 60 or more.
-const NEAR_PLAN: f64 = 3.0;
-/// The same for a twin without equations, where nothing but the plan tells its pace.
-const AS_PLANNED: f64 = 1.2;
-/// Share within which steps are the same.
-const SAME: f64 = 1e-3;
 
 /// Checks the time grid; also returns how many units of the record's time a second is.
 pub(super) fn check(
@@ -34,8 +29,8 @@ pub(super) fn check(
     let length = drive.time(record.samples() - 1);
     let fits = |(fast, slow)| step <= 0.5 * fast && length >= slow;
     let near = match constants {
-        Some(_) => NEAR_PLAN,
-        None => AS_PLANNED,
+        Some(_) => LIMITS.near_plan,
+        None => LIMITS.as_planned,
     };
     let like_plan = |unit: f64| (step / unit / plan).ln().abs() <= near.ln();
     if !constants.is_some_and(fits)
@@ -57,7 +52,7 @@ pub(super) fn check(
             text(step)
         );
         warn("step", message);
-    } else if (step / plan - 1.0).abs() > SAME {
+    } else if (step / plan - 1.0).abs() > LIMITS.same {
         let message = format!(
             "{} s, {} s in the study: a fit takes any step; for a diagnosis or an estimate resample the record, change the step of the study, or let the twin step as the record does",
             text(step),

@@ -119,7 +119,7 @@ impl<T: StateSpace> Engine for T {
             return advance_together(n, points, work, carry, constrain);
         }
         // Loops of known length, for the sizes of most twins.
-        let advance = |x: &mut [f64]| step(self, now, x, work);
+        let advance = |x: &mut [f64]| step(self, &[], now, x, work);
         let constrain = |x: &mut [f64]| self.constrain(now, x);
         match points.shifts.len() {
             1 => advance_one_by_one(1, points, advance, constrain),
@@ -250,21 +250,38 @@ fn run_alone<T: StateSpace>(
 
 /// One step of one state without noise and limits: memories, then motion.
 #[inline(always)]
-fn step<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+fn step<T: StateSpace>(
+    twin: &T,
+    events: &[Event],
+    now: &Now<'_>,
+    x: &mut [f64],
+    work: &mut Workspace,
+) {
     twin.update(now, x);
     // One call of the drift, compiled inline, for what most twins do.
     if work.is_plain() {
         let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| rates(twin, now, x, dx);
         return Integrator::Euler.step(now, x, work.stages(), drift);
     }
-    carry(twin, now, x, work);
+    carry(twin, events, now, x, work);
 }
 
-/// One step by any integrator, in substeps.
+/// One step by any integrator, in substeps, with these events.
 #[inline(never)]
-fn carry<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+fn carry<T: StateSpace>(
+    twin: &T,
+    events: &[Event],
+    now: &Now<'_>,
+    x: &mut [f64],
+    work: &mut Workspace,
+) {
     let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| rates(twin, now, x, dx);
-    work.carry(x.len(), now, x, drift);
+    let calls = EventCalls {
+        list: events,
+        states: x.len(),
+        inside: &|now, _, then| then(now),
+    };
+    work.carry_with_events(&calls, x.len(), now, x, drift);
 }
 
 /// Rates of one state; of a twin in discrete time, those that lead to the next sample.
@@ -305,17 +322,7 @@ impl<T: StateSpace> RunningTwin for Alone<'_, T> {
         self.0.readout(now, y);
     }
     fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
-        if self.1.is_empty() {
-            return step(self.0, now, x, work);
-        }
-        self.0.update(now, x);
-        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| rates(self.0, now, x, dx);
-        let calls = EventCalls {
-            list: self.1,
-            states: x.len(),
-            inside: &|now, _, then| then(now),
-        };
-        work.carry_with_events(&calls, x.len(), now, x, drift);
+        step(self.0, self.1, now, x, work);
     }
     fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
         self.0.constrain(now, x);

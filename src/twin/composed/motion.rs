@@ -151,9 +151,6 @@ impl Composed {
     #[inline(always)]
     fn carry(&self, n: usize, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
         let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.rates(now, x, dx);
-        if !self.parts.acts.on_events {
-            return work.carry(n, now, x, drift);
-        }
         let calls = EventCalls {
             list: &self.parts.outline.events,
             states: self.parts.states,

@@ -19,8 +19,24 @@ pub(super) struct EventMemory {
 }
 
 impl Workspace {
-    /// As [`carry`](Self::carry), of a twin with events: each point has them at its own places.
+    /// Carries points of `n` states each over one sample, with the events of the twin if it has any.
+    #[inline(always)]
     pub(in crate::twin) fn carry_with_events(
+        &mut self,
+        calls: &EventCalls<'_>,
+        n: usize,
+        now: &Now<'_>,
+        x: &mut [f64],
+        drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
+    ) {
+        match calls.list.is_empty() {
+            true => self.carry(n, now, x, drift),
+            false => self.carry_to_events(calls, n, now, x, drift),
+        }
+    }
+
+    /// As [`carry`](Self::carry), of a twin with events: each point has them at its own places.
+    fn carry_to_events(
         &mut self,
         calls: &EventCalls<'_>,
         n: usize,

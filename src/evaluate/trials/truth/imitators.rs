@@ -8,11 +8,12 @@
 //! of both leave much.
 
 use super::NearestEffect;
-use super::sizing::{Experiment, FIRST, Sized};
+use super::sizing::{Experiment, Sized};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::law::DeparturePlace;
 use crate::evaluate::trials::listed::{ListedLaw, Sign, Variant};
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::places::TwinPlaces;
 use crate::math::nearest;
 use crate::study::Study;
@@ -21,14 +22,6 @@ use crate::study::Study;
 const IMITATES: (f64, f64) = (0.02, 1.0);
 /// An effect is searched if a multiple of a change of it leaves less than this share, and less than this in nats.
 const PROMISES: (f64, f64) = (0.5, 6.0);
-/// A law that is proportional to its size is not tried at a larger one where its small change leaves more than this share.
-const UNLIKE: f64 = 0.9;
-/// Share that is as good as nothing: no search can improve on it.
-const NOTHING: f64 = 1e-3;
-/// Sizes on either side of the screened one, as a factor.
-const REACH: f64 = 3.0;
-/// Evaluations of a search.
-const SEARCH: usize = 12;
 
 /// Listed effects beside a departure.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -118,7 +111,7 @@ impl Comparison<'_> {
         }
         match best {
             None => Ok(least),
-            Some(best) if best.left < NOTHING => Ok(best.left),
+            Some(best) if best.left < TRIAL.nothing_left => Ok(best.left),
             Some(best) => Ok(best.left.min(self.searched(&best)?)),
         }
     }
@@ -130,7 +123,7 @@ impl Comparison<'_> {
         variant: Variant,
     ) -> Result<Option<Screened>, EvaluateError> {
         let (experiment, information) = (self.experiment, &self.experiment.information);
-        let Some(small) = experiment.changed(&effect.draft(variant), FIRST)? else {
+        let Some(small) = experiment.changed(&effect.draft(variant), TRIAL.first_size)? else {
             return Ok(None);
         };
         let nats = information.nats(&small);
@@ -143,16 +136,16 @@ impl Comparison<'_> {
         let largest = draft.largest();
         let mut best = Screened {
             draft,
-            size: FIRST * sign * small.multiple,
+            size: TRIAL.first_size * sign * small.multiple,
             left: small.unexplained,
         };
-        if effect.law.sign == Sign::Threshold || (best.size > 0.0 && best.left < UNLIKE) {
+        if effect.law.sign == Sign::Threshold || (best.size > 0.0 && best.left < TRIAL.unlike) {
             // An end of a range, a play, a level at its limit: the size at which the effect changes as much as the departure does.
             let same = match nats > 0.0 {
-                true => FIRST * (information.nats(&self.sized.change) / nats).sqrt(),
-                false => 10.0 * FIRST,
+                true => TRIAL.first_size * (information.nats(&self.sized.change) / nats).sqrt(),
+                false => 10.0 * TRIAL.first_size,
             };
-            let same = nearest(same, 0.1 * FIRST, largest);
+            let same = nearest(same, 0.1 * TRIAL.first_size, largest);
             let large = experiment.changed(&best.draft, same)?;
             let large = large.map(|large| information.matched(&self.sized.change, &large));
             if let Some(large) = large.filter(|large| large.multiple > 0.0)
@@ -180,10 +173,13 @@ impl Comparison<'_> {
         let left = |log: f64| self.left_at(&screened.draft, log.exp());
         let middle = screened.size.ln();
         let largest = screened.draft.largest().ln();
-        let (mut low, mut high) = (middle - REACH.ln(), (middle + REACH.ln()).min(largest));
+        let (mut low, mut high) = (
+            middle - TRIAL.size_reach.ln(),
+            (middle + TRIAL.size_reach.ln()).min(largest),
+        );
         let mut inner = [high - golden * (high - low), low + golden * (high - low)];
         let mut values = [left(inner[0])?, left(inner[1])?];
-        for _ in 2..SEARCH {
+        for _ in 2..TRIAL.size_evaluations {
             if values[0] < values[1] {
                 high = inner[1];
                 (inner[1], values[1]) = (inner[0], values[0]);

@@ -9,6 +9,7 @@ use super::{DrawEnd, Reject};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::{Draft, index};
 use crate::evaluate::trials::listed::{LawForm, Variant};
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::places::Structure;
 use crate::evaluate::trials::places::TwinPlaces;
 use crate::evaluate::trials::scene::Scene;
@@ -19,8 +20,6 @@ use crate::study::{DriveSource, Study};
 use crate::twin::{Noise, ParameterSpace, Source};
 use std::collections::BTreeMap;
 
-/// Draws before a trial is given up.
-const ATTEMPTS: u64 = 60;
 /// Least and largest expected information that is asked for, in nats.
 const INFORMATION: [f64; 2] = [1.0, 300.0];
 
@@ -132,7 +131,7 @@ impl<'a> TruthSampler<'a> {
         noise: Noise,
     ) -> Result<Drawn, EvaluateError> {
         let mut rejected: BTreeMap<Reject, u64> = BTreeMap::new();
-        for redraws in 0..ATTEMPTS {
+        for redraws in 0..TRIAL.truth_attempts {
             let noise = noise.child("attempt").sample(redraws);
             match self.attempt(trial, kind, extra, noise) {
                 Ok(mut drawn) => {
@@ -149,7 +148,7 @@ impl<'a> TruthSampler<'a> {
         Err(EvaluateError::NoTruth {
             trial,
             kind: kind.id(),
-            of: ATTEMPTS,
+            of: TRIAL.truth_attempts,
             reasons: counts.join(", "),
         })
     }

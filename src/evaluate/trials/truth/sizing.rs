@@ -5,25 +5,12 @@ use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::information::{Information, InnovationChange};
 use crate::evaluate::trials::law::Departure;
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::scene::Scene;
 use crate::evaluate::trials::world::{RecordNoise, System, run};
 use crate::record::Record;
 use crate::study::Study;
 use crate::twin::Twin;
-
-/// First size that is tried: small.
-pub(super) const FIRST: f64 = 0.03;
-/// Tries in all.
-const TRIES: usize = 10;
-/// A size is taken within this distance of the wanted information, as a logarithm.
-const NEAR: f64 = 0.15;
-/// Farthest that is taken where no nearer one was found.
-const FAR: f64 = 1.0;
-/// Less than this is no departure.
-const LEAST: f64 = 0.5;
-/// A departure of a pair of whose information the other explains more than nine tenths is the other in another form. Half or twice of it
-/// changes how many pairs are drawn again, not how large the others are.
-const OWN: f64 = 0.1;
 
 /// The system of a trial without its departures, and the filter that measures what departures change.
 pub(super) struct Experiment<'a> {
@@ -139,7 +126,7 @@ impl<'a> Experiment<'a> {
             information.unexplained(&first.change, &second.change),
             information.unexplained(&second.change, &first.change),
         ];
-        if shares.iter().any(|share| *share < OWN) {
+        if shares.iter().any(|share| *share < TRIAL.own_information) {
             return Err(Reject::TooAlike.into());
         }
         let larger: Vec<f64> = wanted.iter().zip(shares).map(|(w, s)| w / s).collect();
@@ -155,7 +142,9 @@ impl<'a> Experiment<'a> {
         for (sized, nats) in all.iter_mut().zip(added) {
             sized.nats = sized.nats.min(nats);
         }
-        let is_near = |(sized, wanted): (&Sized, &f64)| (sized.nats / wanted).ln().abs() <= FAR;
+        let is_near = |(sized, wanted): (&Sized, &f64)| {
+            (sized.nats / wanted).ln().abs() <= TRIAL.far_from_wanted
+        };
         match all.iter().zip(wanted).all(is_near) {
             true => Ok(all),
             false => Err(Reject::TooAlike.into()),
@@ -169,8 +158,8 @@ impl<'a> Experiment<'a> {
         // Logarithms of size and nats, below and above what is wanted.
         let (mut below, mut above): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);
         let largest = draft.largest();
-        let mut size = FIRST;
-        for _ in 0..TRIES {
+        let mut size = TRIAL.first_size;
+        for _ in 0..TRIAL.size_tries {
             match self.of_size(draft, size)? {
                 None => above = Some([size.ln(), f64::INFINITY]),
                 Some(sized) => {
@@ -184,7 +173,7 @@ impl<'a> Experiment<'a> {
                     if best.is_none() || distance(nats) < least {
                         best = Some(sized);
                     }
-                    if distance(nats) < NEAR {
+                    if distance(nats) < TRIAL.near_wanted {
                         break;
                     }
                 }
@@ -207,6 +196,8 @@ impl<'a> Experiment<'a> {
                 (None, None) => break,
             };
         }
-        Ok(best.filter(|b| b.nats > LEAST && distance(b.nats) < FAR))
+        Ok(best.filter(|b| {
+            b.nats > TRIAL.least_information && distance(b.nats) < TRIAL.far_from_wanted
+        }))
     }
 }

@@ -11,8 +11,9 @@ use super::*;
 use crate::diagnose::fixture::tanks;
 use crate::evaluate::paper::reference_studies;
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, SignalDeparture};
+use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::truth::fixture::{experiment, plain};
-use crate::evaluate::trials::truth::sizing::{Experiment, FIRST};
+use crate::evaluate::trials::truth::sizing::Experiment;
 use crate::study::RecordPlan;
 use crate::twin::{Now, Outline, Parameter, StateSpace};
 use crate::twins::VanDerPol;
@@ -162,13 +163,19 @@ fn bias_has_its_information(experiment: &Experiment<'_>) {
     assert!((lost / absorbed - 1.0).abs() < 0.15, "{lost} {absorbed}");
     // The gain of the actuator is what θ does; the bias is no gain.
     let gain = plain("actuator-gain", DeparturePlace::Actuator(0));
-    let gain = experiment.changed(&gain, FIRST).unwrap().unwrap();
+    let gain = experiment
+        .changed(&gain, TRIAL.first_size)
+        .unwrap()
+        .unwrap();
     assert!(
         information.nats(&gain) < 0.05 * nats,
         "{}",
         information.nats(&gain)
     );
-    let same = experiment.changed(&draft, FIRST).unwrap().unwrap();
+    let same = experiment
+        .changed(&draft, TRIAL.first_size)
+        .unwrap()
+        .unwrap();
     assert!(information.unexplained(&change, &same) < 0.01);
 }
 
