@@ -41,10 +41,15 @@ pub(super) fn read(
 
 /// Warns, once of the same: each of several studies reads the records, and one that is fitted may validate, too.
 fn warn(text: &str) {
-    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-    if SAID.lock().is_ok_and(|mut said| said.insert(text.into())) {
+    if is_new(text) {
         output::say(&format!("warning: {text}"));
     }
+}
+
+/// Returns whether this process asks it of a text for the first time.
+fn is_new(text: &str) -> bool {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    SAID.lock().is_ok_and(|mut said| said.insert(text.into()))
 }
 
 /// Warns of the largest value of a record if it is far beyond the others of its channel.
@@ -71,5 +76,17 @@ fn warn_of_outlier(path: &Path, record: &Record) {
                 sample.map_or(largest, |k| channel[k]),
             ));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two studies that are compared read one record each for itself.
+    #[test]
+    fn a_warning_is_said_once() {
+        let told = ["r.csv: far", "r.csv: far", "s.csv: far"].map(is_new);
+        assert_eq!(told, [true, false, true]);
     }
 }

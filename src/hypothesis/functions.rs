@@ -124,26 +124,14 @@ fn term(
     let axes = (effect.magnitudes().iter())
         .map(|_| coefficient(largest))
         .collect();
-    let starts = vec![Start {
-        m: vec![0.0; effect.magnitudes().len()],
-        scales: false,
-    }];
+    let (id, starts) = (effect.id().to_owned(), vec![0.0; effect.magnitudes().len()]);
+    let held = BTreeMap::new();
     Term {
-        id: effect.id().into(),
-        target: target.into(),
-        nature,
-        entries: None,
         axes,
         family: Some((weights, largest)),
-        starts,
+        starts: vec![Start::at(starts)],
         variables,
-        mark: 0.0,
-        also: vec![],
-        trail: None,
-        part: Part::Effect {
-            effect,
-            held: BTreeMap::new(),
-        },
+        ..Term::new(&id, target, nature, Part::Effect { effect, held })
     }
 }
 
@@ -274,22 +262,12 @@ pub(super) fn of_trail(
 
 /// An unknown function that is a part of the twin, of a variable of this name.
 fn of_part(target: &str, name: &str, function: Entered, largest: f64) -> Term {
+    let id = format!("f({name})");
     Term {
-        id: format!("f({name})"),
-        target: target.into(),
-        nature: Nature::Past,
-        part: Part::Function(function),
-        entries: None,
         axes: vec![coefficient(largest); TERMS],
         family: Some((weights(1), largest)),
-        starts: vec![Start {
-            m: vec![0.0; TERMS],
-            scales: false,
-        }],
-        variables: vec![],
-        mark: 0.0,
-        also: vec![],
-        trail: None,
+        starts: vec![Start::at(vec![0.0; TERMS])],
+        ..Term::new(&id, target, Nature::Past, Part::Function(function))
     }
 }
 

@@ -83,7 +83,7 @@ impl Library<'_> {
                 let m = (shown_free(&term, &shown).iter().zip(&term.axes))
                     .map(|(value, axis)| axis.bounds.clamp(*value))
                     .collect();
-                term.starts.insert(0, Start { m, scales: false });
+                term.starts.insert(0, Start::at(m));
             }
             term
         }))
@@ -234,23 +234,11 @@ fn ways(effect: &Effect, mark: &OutputMark) -> Vec<Vec<usize>> {
 
 /// The term of an effect, some of its magnitudes held, without axes and starts.
 fn bare(effect: &Effect, held: BTreeMap<String, f64>) -> Term {
-    Term {
-        id: effect.id().into(),
-        target: effect.target().into(),
-        nature: Nature::Listed,
-        part: Part::Effect {
-            effect: effect.clone(),
-            held,
-        },
-        entries: None,
-        axes: vec![],
-        family: None,
-        starts: vec![],
-        variables: vec![],
-        mark: 0.0,
-        also: vec![],
-        trail: None,
-    }
+    let part = Part::Effect {
+        effect: effect.clone(),
+        held,
+    };
+    Term::new(effect.id(), effect.target(), Nature::Listed, part)
 }
 
 /// Values that outputs show of a term's free magnitudes, of those of its effect.
@@ -265,10 +253,7 @@ fn shown_free(term: &Term, shown: &[f64]) -> Vec<f64> {
 
 /// Holds magnitudes where the outputs show them: they are not to be fitted.
 fn marked(term: &mut Term, shown: &[f64], values: &[f64]) {
-    term.starts = vec![Start {
-        m: shown_free(term, shown),
-        scales: false,
-    }];
+    term.starts = vec![Start::at(shown_free(term, shown))];
     // Values on few levels repeat at an end without a limit there.
     let rounds = matches!(&term.part, Part::Effect { effect, .. } if matches!(effect.law(), Law::Rounding(_)));
     term.mark = match !rounds && on_levels(values) {

@@ -73,21 +73,12 @@ pub(crate) fn proportional<'t>(
     };
     let fitted = (sensors.iter().enumerate()).filter(|(_, target)| fitted_noise.contains(target));
     fitted.map(move |(output, target)| Term {
-        id: PROPORTIONAL.into(),
-        target: target.clone(),
-        nature: Nature::Noise,
-        part: Part::Share { output },
         axes: vec![axis.clone()],
-        entries: None,
-        family: None,
         // One pass with a little of it tells what it promises.
         starts: vec![Start {
             m: vec![0.0],
             scales: true,
         }],
-        variables: vec![],
-        mark: 0.0,
-        also: vec![],
-        trail: None,
+        ..Term::new(PROPORTIONAL, target, Nature::Noise, Part::Share { output })
     })
 }

@@ -53,6 +53,13 @@ pub(crate) struct Start {
     pub scales: bool,
 }
 
+impl Start {
+    /// These values as they are.
+    pub fn at(m: Vec<f64>) -> Self {
+        Self { m, scales: false }
+    }
+}
+
 /// A term that a twin may lack.
 #[derive(Debug, Clone)]
 pub(crate) struct Term {
@@ -90,6 +97,24 @@ pub(crate) fn marks<'t>(terms: impl IntoIterator<Item = &'t Arc<Term>>) -> f64 {
 }
 
 impl Term {
+    /// A term without magnitudes, starts and variables.
+    pub fn new(id: &str, target: &str, nature: Nature, part: Part) -> Self {
+        Self {
+            id: id.into(),
+            target: target.into(),
+            nature,
+            part,
+            entries: None,
+            axes: vec![],
+            family: None,
+            starts: vec![],
+            variables: vec![],
+            mark: 0.0,
+            also: vec![],
+            trail: None,
+        }
+    }
+
     /// `id@target`.
     pub fn key(&self) -> String {
         EffectKey::new(&self.id, &self.target).to_string()
@@ -222,18 +247,8 @@ pub(crate) mod fixture {
             held: BTreeMap::new(),
         };
         Term {
-            id: "wave".into(),
-            target: target.into(),
-            nature,
-            part,
-            entries: None,
-            axes: vec![],
-            family: None,
-            starts: vec![],
-            variables: vec![],
             mark,
-            also: vec![],
-            trail: None,
+            ..Term::new("wave", target, nature, part)
         }
     }
 }

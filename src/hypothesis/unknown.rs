@@ -172,10 +172,7 @@ fn periodic(
     let mut term = wave(kind, target, largest, axis);
     term.starts = grid
         .into_iter()
-        .map(|f| Start {
-            m: vec![0.0, 0.0, f],
-            scales: false,
-        })
+        .map(|f| Start::at(vec![0.0, 0.0, f]))
         .collect();
     (!term.starts.is_empty()).then_some(term)
 }
@@ -196,27 +193,14 @@ pub(super) fn disturbances(
         ..uniform_axis(&parameter, true)
     };
     (times.into_iter())
-        .map(|time| Term {
-            id: "f(t)".into(),
-            target: target.into(),
-            nature: Nature::Time,
-            part: Part::Disturbance {
-                entry,
-                memory: (-dt / time).exp(),
-            },
-            axes: vec![axis.clone()],
-            entries: None,
-            family: None,
-            starts: SIZES
-                .map(|s| Start {
-                    m: vec![s * largest],
-                    scales: false,
-                })
-                .to_vec(),
-            variables: vec![],
-            mark: 0.0,
-            also: vec![],
-            trail: None,
+        .map(|time| {
+            let memory = (-dt / time).exp();
+            let part = Part::Disturbance { entry, memory };
+            Term {
+                axes: vec![axis.clone()],
+                starts: SIZES.map(|s| Start::at(vec![s * largest])).to_vec(),
+                ..Term::new("f(t)", target, Nature::Time, part)
+            }
         })
         .collect()
 }

@@ -280,11 +280,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 163, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 59_800, lines),
+        Ratchet::new("lines of code", 59_740, lines),
         Ratchet::new("files", 482, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 497, constants(sources)),
+        Ratchet::new("named numeric constants", 284, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             3,
@@ -295,7 +295,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
             1,
             long_functions(sources, 100),
         ),
-        Ratchet::new("further types of one name", 24, repeated_types(sources)),
+        Ratchet::new("further types of one name", 23, repeated_types(sources)),
         Ratchet::new(
             "library messages with words of the command line",
             1,

@@ -9,17 +9,22 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Refinements after the two regressions: where noise prevails these start far off, and three are too few.
-const PASSES: usize = 6;
-/// Ridge of a refinement, relative to the unit diagonal: what the data do not tell apart (zeros of A and of C that nearly
-/// cancel) stays near the value that the regressions gave it.
-const RIDGE: f64 = 1e-4;
-/// Halvings of a refinement that would not make the residuals smaller, after which it is left out.
-const HALVINGS: usize = 4;
-/// Largest modulus of a zero of C: residuals forget their start within some hundred samples.
-const LARGEST_ZERO: f64 = 0.98;
-/// Innovations below this share of the output, as standard deviations, are rounding.
-const ROUNDING: f64 = 1e-9;
+numbers! {
+    /// Refinements of a fit, and what they may do.
+    const ARMAX: ArmaxLimits = {
+        /// Refinements after the two regressions: where noise prevails these start far off, and three are too few.
+        passes: usize = 6,
+        /// Ridge of a refinement, relative to the unit diagonal: what the data do not tell apart (zeros of A and of C that nearly
+        /// cancel) stays near the value that the regressions gave it.
+        ridge: f64 = 1e-4,
+        /// Halvings of a refinement that would not make the residuals smaller, after which it is left out.
+        halvings: usize = 4,
+        /// Largest modulus of a zero of C: residuals forget their start within some hundred samples.
+        largest_zero: f64 = 0.98,
+        /// Innovations below this share of the output, as standard deviations, are rounding.
+        rounding: f64 = 1e-9,
+    }
+}
 
 /// ARMAX(p, q, r): a model of each output with coloured noise,
 ///
@@ -167,9 +172,9 @@ fn estimate(y: &[f64], inputs: &[Vec<f64>], orders: Orders) -> Result<ArmaxModel
     let series = ArmaxSeries::new(y, inputs, orders);
     let mut theta = series.by_regressions()?;
     let mut residuals = series.residuals(&theta);
-    for _ in 0..PASSES {
+    for _ in 0..ARMAX.passes {
         let step = series.newton_step(&theta, &residuals)?;
-        for halving in 0..=HALVINGS {
+        for halving in 0..=ARMAX.halvings {
             let share = 0.5f64.powi(halving as i32);
             let mut next: Vec<f64> = (theta.iter().zip(&step))
                 .map(|(theta, step)| theta + share * step)
@@ -183,7 +188,7 @@ fn estimate(y: &[f64], inputs: &[Vec<f64>], orders: Orders) -> Result<ArmaxModel
         }
     }
     let rows = (y.len() - orders.start()) as f64;
-    let floor = ROUNDING * (sum_of_squares(y) / y.len() as f64).sqrt();
+    let floor = ARMAX.rounding * (sum_of_squares(y) / y.len() as f64).sqrt();
     Ok(ArmaxModel {
         coefficients: theta,
         innovation: (sum_of_squares(&residuals) / rows).sqrt().max(floor),
@@ -265,7 +270,7 @@ impl<'a> ArmaxSeries<'a> {
             }
         }
         let (gram, psi) = (&psi * psi.transpose(), psi.transpose());
-        let fit = LeastSquares::with_ridge(&psi, &gram, RIDGE)?.solve(&residuals[start..])?;
+        let fit = LeastSquares::with_ridge(&psi, &gram, ARMAX.ridge)?.solve(&residuals[start..])?;
         Ok(fit.coefficients)
     }
 }
@@ -283,11 +288,11 @@ fn sum_of_squares(x: &[f64]) -> f64 {
     x.iter().map(|v| v * v).sum()
 }
 
-/// Draws the zeros of 1 + Σ cᵢ z⁻ⁱ towards the origin, all by one factor, until none is larger than [`LARGEST_ZERO`]:
-/// continuous in c, and C is left alone where it is invertible already.
+/// Draws the zeros of 1 + Σ cᵢ z⁻ⁱ towards the origin, all by one factor, until none is larger than
+/// `ARMAX.largest_zero`: continuous in c, and C is left alone where it is invertible already.
 fn make_invertible(c: &mut [f64]) {
     let scaled = |s: f64| -> Vec<f64> { scale_zeros(c, s) };
-    let within = |s: f64| is_invertible(scaled(s / LARGEST_ZERO));
+    let within = |s: f64| is_invertible(scaled(s / ARMAX.largest_zero));
     if within(1.0) {
         return;
     }

@@ -8,22 +8,32 @@ use crate::twin::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Standard deviation of the logarithm of a level that nothing is declared of: within a factor of 50 at two of them. Half of it ties
-/// rigs to this file's guesses of size; twice costs a nat a level, for all explanations alike.
-const UNDECLARED: f64 = 2.0;
-/// Guess of an undeclared process noise: over the record, a random walk of this share of the state's own motion.
-const WANDER: f64 = 0.1;
-/// Guess of an undeclared measurement noise, as a share of the output's deviation.
-pub(super) const SHARE: f64 = 0.03;
-/// Loud noise, from which fits begin: a step of this share of the state's own motion. Predictions then hardly reach beyond a row,
-/// and the likelihood has no narrow valleys.
-const LOUD: f64 = 0.1;
-/// Range of a fitted level, as powers of e around its guess: rounding at one end, nonsense at the other.
-const RANGE: f64 = 12.0;
-
-/// Least measurement noise of outputs that stop at an end of their range, as a share of their motion: where the twin stops there, too,
-/// noise that vanishes would make those samples infinitely likely.
-const STOPPED: f64 = 1e-3;
+numbers! {
+    /// Guesses of noise and starts that nothing is declared of, and when a declared start is doubted.
+    pub(super) const MEASURED: MeasuredLimits = {
+        /// Standard deviation of the logarithm of a level that nothing is declared of: within a factor of 50 at two of them. Half of it ties
+        /// rigs to this file's guesses of size; twice costs a nat a level, for all explanations alike.
+        undeclared: f64 = 2.0,
+        /// Guess of an undeclared process noise: over the record, a random walk of this share of the state's own motion.
+        wander: f64 = 0.1,
+        /// Guess of an undeclared measurement noise, as a share of the output's deviation.
+        share: f64 = 0.03,
+        /// Loud noise, from which fits begin: a step of this share of the state's own motion. Predictions then hardly reach beyond a row,
+        /// and the likelihood has no narrow valleys.
+        loud: f64 = 0.1,
+        /// Range of a fitted level, as powers of e around its guess: rounding at one end, nonsense at the other.
+        range: f64 = 12.0,
+        /// Least measurement noise of outputs that stop at an end of their range, as a share of their motion: where the twin stops there, too,
+        /// noise that vanishes would make those samples infinitely likely.
+        stopped: f64 = 1e-3,
+        /// Distance of the first row from the start, in deviations of the noise, beyond which the record began elsewhere. At half of it a right start is
+        /// given up in one of eighty records; at twice of it a wrong one of ten deviations is believed.
+        elsewhere: f64 = 5.0,
+        /// Nats by which records must be better explained with a start that their first rows contradict for it to stand: something is then missing that bends
+        /// these rows, with prior odds of 1 to 20. With twice of it an offset of a sensor, better by 5.8, passes for a force.
+        stands: f64 = 3.0,
+    }
+}
 
 /// Largest share of its signal that noise may be: what says less of its signal is no reading of it. Half of it leaves out counts of few
 /// events; twice as much changes no answer.
@@ -123,7 +133,7 @@ pub(super) struct DeclaredLevels {
 
 /// Prior and bounds of a level, no lower than `floor`.
 fn ranges(median: f64, deviation: f64, floor: f64) -> [Interval; 2] {
-    [deviation, RANGE].map(|reach| {
+    [deviation, MEASURED.range].map(|reach| {
         let low = (median / reach.exp()).max(floor);
         Interval::unchecked(low, median * reach.exp())
     })
@@ -163,7 +173,7 @@ pub(super) fn build(
         let (median, deviation) = if declared > 0.0 {
             (declared, beliefs.factors.get(name).map_or(1.0, |f| f.ln()))
         } else {
-            (guess, UNDECLARED)
+            (guess, MEASURED.undeclared)
         };
         // The least level that the record can tell stands for a declared one below it.
         let median = median.max(floor);
@@ -195,8 +205,8 @@ pub(super) fn build(
             format!("{}/√s", state.unit)
         };
         let declared = declared.process[i] / beliefs.step.sqrt();
-        let guess = WANDER * motion[i] / longest.sqrt();
-        let loud = LOUD * motion[i] / step.sqrt();
+        let guess = MEASURED.wander * motion[i] / longest.sqrt();
+        let loud = MEASURED.loud * motion[i] / step.sqrt();
         if let Some(entry) = add(&state.name, unit, 0.0, declared, guess, loud) {
             noisy.process[i] = LevelSource::Fitted { entry, declared };
         }
@@ -205,13 +215,13 @@ pub(super) fn build(
         }
     }
     for (j, output) in outline.outputs.iter().enumerate() {
-        let (guess, loud) = (SHARE * outputs[j], LOUD * outputs[j]);
+        let (guess, loud) = (MEASURED.share * outputs[j], MEASURED.loud * outputs[j]);
         let unit = output.unit.clone();
         let stops = records
             .iter()
             .any(|r| stops(&r.outputs().column(j).to_vec()));
         let floor = if stops {
-            STOPPED * outputs[j]
+            MEASURED.stopped * outputs[j]
         } else {
             f64::MIN_POSITIVE
         };

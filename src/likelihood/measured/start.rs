@@ -7,18 +7,12 @@
 //! |y(0) − g(x_0, θ)| > 5·s   for all θ within the bounds, effects off     s: declared noise of the output, or what its second differences show
 //! ```
 
-use super::level::{Beliefs, StartElsewhere};
+use super::level::{Beliefs, MEASURED, StartElsewhere};
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::math::median;
 use crate::record::Record;
 use crate::twin::{Acting, Composed, Now, Role, is_memory};
 
-/// Distance of the first row from the start, in deviations of the noise, beyond which the record began elsewhere. At half of it a right start is
-/// given up in one of eighty records; at twice of it a wrong one of ten deviations is believed.
-const ELSEWHERE: f64 = 5.0;
-/// Nats by which records must be better explained with a start that their first rows contradict for it to stand: something is then missing that bends
-/// these rows, with prior odds of 1 to 20. With twice of it an offset of a sensor, better by 5.8, passes for a force.
-const STANDS: f64 = 3.0;
 /// Median absolute second difference of white noise, in its standard deviations: 0.6745·√6.
 const SECOND_DIFFERENCE: f64 = 1.652;
 
@@ -30,8 +24,8 @@ pub(crate) fn with_better_start<R, E>(
     again: impl FnOnce() -> Result<R, E>,
 ) -> Result<(R, bool), E> {
     let held = again()?;
-    let stands =
-        (nats(&held).zip(nats(&given_up))).is_some_and(|(held, other)| held - other > STANDS);
+    let stands = (nats(&held).zip(nats(&given_up)))
+        .is_some_and(|(held, other)| held - other > MEASURED.stands);
     Ok((if stands { held } else { given_up }, stands))
 }
 
@@ -124,7 +118,11 @@ fn contradiction(
         }
         for i in 0..n {
             // An unknown state may be anywhere.
-            let reach = if unknown[i] { 1.0 } else { ELSEWHERE * std[i] };
+            let reach = if unknown[i] {
+                1.0
+            } else {
+                MEASURED.elsewhere * std[i]
+            };
             for reach in [reach, -reach].into_iter().filter(|reach| *reach != 0.0) {
                 let (mut moved, mut there) = (x.clone(), vec![0.0; p]);
                 moved[i] += reach;
@@ -159,7 +157,7 @@ fn contradiction(
             let value = record.outputs()[[k, j]];
             let expected = value.max(low).min(high);
             let values = record.outputs().column(j).to_vec();
-            let reach = ELSEWHERE
+            let reach = MEASURED.elsewhere
                 * noise[j]
                     .max(roughness(&values))
                     .max(record.cells()[j].sqrt());

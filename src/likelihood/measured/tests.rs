@@ -1,6 +1,6 @@
 //! Noise levels of the reference twins.
 
-use super::level::SHARE;
+use super::level::MEASURED;
 use super::*;
 use crate::likelihood::kalman::{FilterSettings, Kalman};
 use crate::math::deviation;
@@ -75,7 +75,7 @@ fn undeclared_levels_come_from_the_record() {
         .collect();
     assert_eq!(names, ["noise.x1", "noise.y"]);
     let y = deviation(&record.outputs().column(0).to_vec());
-    assert!((measured.levels[1].median - SHARE * y).abs() < 1e-12);
+    assert!((measured.levels[1].median - MEASURED.share * y).abs() < 1e-12);
     let theta: Vec<f64> = [1.5].into_iter().chain(medians(&measured)).collect();
     let now = Now::new(0.0, 0.05, &[], &theta);
     let mut std = [0.0; 2];
@@ -237,4 +237,16 @@ fn declared_levels_follow_the_states() {
         .sum();
     assert!((at(typical) - expected).abs() < 1e-6);
     assert!(at(typical) > at(2.0 * typical) && at(typical) > at(0.5 * typical));
+}
+
+/// Of a start that the first rows contradict, 3 nats decide.
+#[test]
+fn a_contradicted_start_stands_where_it_explains_enough() {
+    let better = |held: Option<f64>| {
+        let again = || Ok::<_, ()>(held);
+        with_better_start(Some(1.0), |nats| *nats, again).unwrap()
+    };
+    assert_eq!(better(Some(4.1)), (Some(4.1), true));
+    assert_eq!(better(Some(3.9)), (Some(1.0), false));
+    assert_eq!(better(None), (Some(1.0), false));
 }
