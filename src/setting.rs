@@ -57,6 +57,17 @@ impl SettingError {
         }
     }
 
+    /// Fails unless a level lies between 0 and 1; `usual` is an example.
+    pub(crate) fn unless_level(name: &str, level: f64, usual: f64) -> Result<(), Self> {
+        let remedy = format!("choose a level between 0 and 1, such as {usual}");
+        Self::unless(level > 0.0 && level < 1.0, name, level, remedy)
+    }
+
+    /// Fails where a count is larger than `most`.
+    pub(crate) fn unless_at_most(name: &str, count: usize, most: usize) -> Result<(), Self> {
+        Self::unless(count <= most, name, count, format!("choose at most {most}"))
+    }
+
     /// Which setting.
     pub fn name(&self) -> &str {
         &self.name

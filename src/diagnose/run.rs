@@ -141,19 +141,8 @@ fn check(
         }
     }
     Record::check_outputs(records, &study.twin().signals().outputs)?;
-    let alpha = settings.alpha;
-    SettingError::unless(
-        alpha > 0.0 && alpha < 1.0,
-        "alpha",
-        alpha,
-        "choose a level between 0 and 1, such as 0.05",
-    )?;
-    SettingError::unless(
-        settings.calibrate <= MOST_SIMULATIONS,
-        "calibrate",
-        settings.calibrate,
-        format!("choose at most {MOST_SIMULATIONS}"),
-    )?;
+    SettingError::unless_level("alpha", settings.alpha, 0.05)?;
+    SettingError::unless_at_most("calibrate", settings.calibrate, MOST_SIMULATIONS)?;
     Ok(())
 }
 

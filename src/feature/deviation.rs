@@ -88,12 +88,12 @@ impl FeatureMap for DeviationMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::feature::testing::Tank;
+    use crate::feature::testing::tank;
     use crate::twin::Noise;
 
     #[test]
     fn a_constant_offset_is_every_feature() {
-        let twin = Twin::new(Tank(1));
+        let twin = Twin::new(tank(1));
         let drive = Drive::new(0.5, Signal::from_elem((50, 1), 1.0)).unwrap();
         let map = Deviation { blocks: 7 }.bind(&twin).unwrap();
         let centre = twin.parameters().centre();

@@ -193,30 +193,15 @@ fn check_varies(outputs: &Signal) -> Result<(), FeatureError> {
 
 #[cfg(test)]
 mod testing {
-    use crate::record::Quantity;
-    use crate::twin::{Now, Outline, Parameter, ParameterSpace, StateSpace};
+    use crate::twin::Parameter;
+    use crate::twin::fixture::OneState;
 
     /// One state, `inputs` inputs, one output: ẋ = −k·x + Σu.
-    pub(super) struct Tank(pub usize);
-
-    impl StateSpace for Tank {
-        fn outline(&self) -> Outline {
-            Outline {
-                parameters: ParameterSpace::new([Parameter::new("k", "1/s", 0.1, 1.0)]),
-                states: vec![Quantity::new("x", "m")],
-                inputs: vec![Quantity::new("u", "m/s"); self.0],
-                outputs: vec![Quantity::new("y", "m")],
-                ..Outline::new()
-            }
-        }
-        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-            dx[0] = now.u.iter().sum::<f64>() - now.theta[0] * x[0];
-        }
-        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-            y[0] = x[0];
-        }
-        fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
-            (process[0], measurement[0]) = (0.02, 0.05);
+    pub(super) fn tank(inputs: usize) -> OneState {
+        OneState {
+            inputs,
+            noise: [0.02, 0.05],
+            ..OneState::leaking(Parameter::new("k", "1/s", 0.1, 1.0))
         }
     }
 }

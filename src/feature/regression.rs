@@ -131,11 +131,11 @@ pub(super) fn regress(signals: Vec<Lagged>, start: usize) -> Result<Regression, 
 mod tests {
     mod without_inputs {
         use super::super::*;
-        use crate::feature::testing::Tank;
+        use crate::feature::testing::tank;
         use crate::record::{Drive, Signal};
 
         fn features(order: usize, y: &[f64]) -> Result<Vec<f64>, FeatureError> {
-            let twin = Twin::new(Tank(0));
+            let twin = Twin::new(tank(0));
             let outputs = Signal::from_shape_vec((y.len(), 1), y.to_vec()).unwrap();
             let drive = Drive::autonomous(1.0, y.len()).unwrap();
             Ar { order }.bind(&twin)?.extract(&drive, &outputs)

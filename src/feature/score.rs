@@ -128,11 +128,11 @@ impl FeatureMap for ScoreMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::feature::testing::Tank;
+    use crate::feature::testing::tank;
     use crate::twin::Noise;
 
     fn bound() -> (Twin, Arc<dyn FeatureMap>) {
-        let twin = Twin::new(Tank(1));
+        let twin = Twin::new(tank(1));
         let map = Score::default().bind(&twin).unwrap();
         (twin, map)
     }

@@ -99,32 +99,17 @@ mod tests {
     use super::*;
     use crate::record::{Drive, Record, Signal};
     use crate::study::Study;
-    use crate::twin::{Noise, Now, Outline, Parameter, StateSpace, Twin};
+    use crate::twin::fixture::OneState;
+    use crate::twin::{Noise, Parameter, Twin};
 
     /// A room that is heated: τ·ẋ = K·u − x.
-    #[derive(Clone)]
-    struct Room;
-
-    impl StateSpace for Room {
-        fn outline(&self) -> Outline {
-            Outline::new()
-                .parameter(Parameter::new("K", "K/W", 0.5, 4.0))
-                .parameter(Parameter::new("tau", "s", 1.0, 8.0))
-                .state("x", "K")
-                .input("u", "W")
-                .output("y", "K")
-        }
-        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-            dx[0] = (now.theta[0] * now.u[0] - x[0]) / now.theta[1];
-        }
-        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-            y[0] = x[0];
-        }
-        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
-            measurement[0] = 0.02;
-        }
-        fn integrator(&self) -> Integrator {
-            Integrator::RungeKutta4
+    fn room() -> OneState {
+        let gain = Parameter::new("K", "K/W", 0.5, 4.0);
+        let tau = Parameter::new("tau", "s", 1.0, 8.0);
+        OneState {
+            noise: [0.0, 0.02],
+            integrator: Integrator::RungeKutta4,
+            ..OneState::new([gain, tau], |theta, u, x| (theta[0] * u[0] - x) / theta[1])
         }
     }
 
@@ -137,10 +122,10 @@ mod tests {
             hold: made_with,
             ..Stepping::default()
         };
-        let world = (Twin::new(Room).stepped(|_, own| *own = stepping)).unwrap();
+        let world = (Twin::new(room()).stepped(|_, own| *own = stepping)).unwrap();
         let outputs = world.simulate(&[2.0, 3.0], &drive, Noise::new(seed, "held", 0));
         let record = Record::new(drive, outputs.unwrap()).unwrap();
-        let fit = Study::of(Room).unwrap().fit(&[record]).unwrap();
+        let fit = Study::of(room()).unwrap().fit(&[record]).unwrap();
         fit.stepping.map(|stepping| stepping.hold)
     }
 

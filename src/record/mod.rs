@@ -10,7 +10,6 @@ mod channels;
 mod csv;
 mod drive;
 mod error;
-mod lines;
 mod measured;
 mod parquet;
 mod resample;

@@ -1,7 +1,7 @@
 //! The numbers of a record file, checked cell by cell.
 
 use super::channels::{Wanted, column_names, columns, is_usual};
-use super::lines::FileLines;
+use super::drive::FileLines;
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};
 use crate::record::{Drive, Record, RecordError, Signal};

@@ -1,12 +1,62 @@
-//! Numbers for people: as many digits as they are worth.
+//! Numbers for people: as many as there is room for, with the digits that they are worth.
 
 use crate::record::Quantity;
 
-/// Significant digits of a standard error, and of a number without one.
-const OF_ERROR: i32 = 2;
-const OF_NUMBER: i32 = 3;
-/// Most significant digits of a value, however small its error.
-const MOST: i32 = 7;
+numbers! {
+    /// Limits of a page, a picture and the terminal, and of what a sentence is sure of. The JSON has everything.
+    pub(super) const SHOWN: ShownLimits = {
+        /// Significant digits of a standard error.
+        digits_of_error: i32 = 2,
+        /// Significant digits of a number without an error.
+        digits: i32 = 3,
+        /// Most significant digits of a value, however small its error.
+        most_digits: i32 = 7,
+        /// Characters of a headline: two lines of a page.
+        headline: usize = 140,
+        /// Words of the answer: with heading and caption there are at most 60 on the first screen.
+        answer_words: usize = 46,
+        /// Probability from which a name is stated.
+        stated: f64 = 0.5,
+        /// Probability that nothing is missing below which *no gap* is said with a reservation.
+        clear: f64 = 0.9,
+        /// Names in one sentence.
+        names: usize = 3,
+        /// Terms of a missing function that a sentence names.
+        terms: usize = 3,
+        /// Effects on the terminal.
+        effects: usize = 4,
+        /// Windows and ranges that the terminal names.
+        windows: usize = 2,
+        /// Bursts that the text names.
+        bursts: usize = 3,
+        /// Weak combinations of parameters.
+        combinations: usize = 2,
+        /// Characters of a combination.
+        combination: usize = 90,
+        /// Level below which records are said to disagree.
+        disagreement: f64 = 0.01,
+        /// Parameters of each record.
+        of_record: usize = 6,
+        /// Share of the prior from which on a remark names it.
+        leaning: f64 = 0.1,
+        /// Explanations that are drawn.
+        explanations: usize = 8,
+        /// Share of a place from which on it is drawn: what rounds to nothing is left to the JSON.
+        visible: f64 = 0.005,
+        /// Quantities that a pair plot has room for.
+        paired: usize = 6,
+        /// Lags of the correlations of residuals, in samples.
+        lags: usize = 20,
+        /// Standard deviations of 95 % of white noise.
+        white_band: f64 = 1.96,
+        /// Points of a quantile plot: more only blot.
+        quantiles: usize = 200,
+        /// Panels of cross-correlations; more pairs of output and input are left out.
+        cross_panels: usize = 12,
+        /// Parameters that a comparison of estimators draws: more panels are a roll, not a picture.
+        panels: usize = 6,
+    }
+}
 
 /// Notation of the numbers of one quantity, the same for all of them so that they can be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,11 +71,15 @@ impl Digits {
     /// Digits that `std_error` supports for numbers of the size of `value`: two of the error, at most seven of the value.
     pub(super) fn supported(value: f64, std_error: f64) -> Self {
         if !(std_error > 0.0 && std_error.is_finite()) {
-            return Self::significant(value, OF_NUMBER + 1);
+            return Self::significant(value, SHOWN.digits + 1);
         }
-        let last = rounded_magnitude(std_error, OF_ERROR) - (OF_ERROR - 1);
+        let last =
+            rounded_magnitude(std_error, SHOWN.digits_of_error) - (SHOWN.digits_of_error - 1);
         let largest = value.abs().max(std_error);
-        Self::down_to(last.max(magnitude(largest) - (MOST - 1)), largest)
+        Self::down_to(
+            last.max(magnitude(largest) - (SHOWN.most_digits - 1)),
+            largest,
+        )
     }
 
     /// `digits` significant ones.
@@ -73,12 +127,12 @@ pub(super) fn probability(p: f64) -> String {
 
 /// A standard error, two significant digits.
 pub(super) fn error(value: f64) -> String {
-    Digits::significant(value, OF_ERROR).write(value)
+    Digits::significant(value, SHOWN.digits_of_error).write(value)
 }
 
 /// Three significant digits.
 pub(super) fn short(value: f64) -> String {
-    Digits::significant(value, OF_NUMBER).write(value)
+    Digits::significant(value, SHOWN.digits).write(value)
 }
 
 /// A share in percent; three digits where it is absurd.

@@ -1,7 +1,7 @@
 //! A fit as JSON and as a document.
 
 use super::chart::{Line, Panel, Style, TimeMark, chart, pair_plot};
-use super::digits::{in_unit, own_unit, percent, short, unit_suffix, with_error, with_unit};
+use super::digits::{SHOWN, in_unit, own_unit, percent, short, unit_suffix, with_error, with_unit};
 use super::document::Column::{Number, Text};
 use super::document::{Block, Document, Picture, Section};
 use super::parameters::{ParameterRow, priors, values};
@@ -303,16 +303,13 @@ pub(super) fn draws(study: &Study, posterior: &Posterior) -> Section {
     Section::new("draws", "Posterior draws", rest).brief(vec![brief])
 }
 
-/// Quantities that a pair plot has room for.
-const PAIRED: usize = 6;
-
 /// A picture of posterior draws: histograms of the twin's parameters, or of whatever else was fitted, and each against each.
 pub(crate) fn posterior_svg(study: &Study, posterior: &Posterior) -> String {
     let space = study.twin().parameters();
     let unit = |name: &str| (space.iter().find(|p| p.name == name)).map(|p| unit_suffix(&p.unit));
     let own = |j: &usize| unit(&posterior.names[*j]).is_some();
     let (own, others): (Vec<usize>, Vec<usize>) = (0..posterior.names.len()).partition(own);
-    let columns = own.into_iter().chain(others).take(PAIRED).map(|j| {
+    let columns = own.into_iter().chain(others).take(SHOWN.paired).map(|j| {
         let name = &posterior.names[j];
         let named = format!("{name}{}", unit(name).unwrap_or_default());
         (named, posterior.values.column(j).to_vec())

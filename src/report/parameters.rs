@@ -1,6 +1,6 @@
 //! The tables of parameters that `estimate`, `fit` and `diagnose` share.
 
-use super::digits::{self, Digits};
+use super::digits::{self, Digits, SHOWN};
 use super::document::Block;
 use super::document::Column::{Number, Text};
 use crate::diagnose::FittedParameter;
@@ -8,9 +8,6 @@ use crate::math::three_digits;
 use crate::setting::number;
 use crate::twin::{Interval, PRIOR_DEVIATION, Parameter, Role, Side};
 use serde::Serialize;
-
-/// Share of the prior from which on a remark names it.
-const LEANING: f64 = 0.1;
 
 /// One parameter: what the record says of it beside what was said before.
 #[derive(Debug, Clone, Serialize)]
@@ -91,7 +88,7 @@ impl ParameterRow {
     fn remark(&self) -> String {
         match (self.note(), self.role) {
             ("", _) if self.by_profile => "interval by profile".to_owned(),
-            ("", Role::Parameter) if self.prior_share >= LEANING => {
+            ("", Role::Parameter) if self.prior_share >= SHOWN.leaning => {
                 let share = digits::percent(self.prior_share);
                 match self.leans {
                     true => format!("leans on prior: {share}"),

@@ -3,17 +3,9 @@
 use super::chart::{Area, Dot, Dots, Line, Panel, Style, chart};
 use super::document::Block;
 use crate::record::Signal;
+use crate::report::digits::SHOWN;
 use crate::study::Study;
 use statrs::distribution::{ContinuousCDF, Normal};
-
-/// Lags of the correlations, in samples.
-const LAGS: usize = 20;
-/// Standard deviations of 95 % of white noise.
-const BAND: f64 = 1.96;
-/// Points of a quantile plot: more only blot.
-const QUANTILES: usize = 200;
-/// Panels of cross-correlations; more pairs of output and input are left out.
-const PAIRS: usize = 12;
 
 /// Inputs of one record, N × inputs, and its residuals, N × outputs; NaN where nothing was measured.
 pub(super) type Left<'a> = (&'a Signal, &'a Signal);
@@ -107,7 +99,7 @@ fn panel(label: &str, at: impl Fn(usize) -> f64, lags: [usize; 2], count: Option
     let panel = match count {
         None => panel,
         Some(count) => {
-            let reach = BAND / (count.max(1) as f64).sqrt();
+            let reach = SHOWN.white_band / (count.max(1) as f64).sqrt();
             panel.area(Area {
                 label: "95 % of white noise".into(),
                 points: ends.map(|x| (x, -reach, reach)).to_vec(),
@@ -132,10 +124,13 @@ fn auto_correlations(names: &[String], is_white: bool, all: &[Left<'_>]) -> Stri
         let own = centred(all, |l| l.1, j);
         let at = |lag| correlation(&own, &own, lag);
         let label = format!("correlation of {name}");
-        panel(&label, at, [1, LAGS], is_white.then(|| count(all, j)))
+        panel(&label, at, [1, SHOWN.lags], is_white.then(|| count(all, j)))
     });
     let axis = ("lag in samples".to_owned(), panels.collect());
-    let description = format!("Auto-correlations of the residuals at lags 1 to {LAGS}.");
+    let description = format!(
+        "Auto-correlations of the residuals at lags 1 to {}.",
+        SHOWN.lags
+    );
     chart("Autocorrelation of residuals", &description, &[axis])
 }
 
@@ -148,21 +143,22 @@ fn cross_correlations(
 ) -> Option<String> {
     let pairs = (0..outputs.len()).flat_map(|j| (0..inputs.len()).map(move |i| (j, i)));
     let panels: Vec<Panel> = pairs
-        .take(PAIRS)
+        .take(SHOWN.cross_panels)
         .map(|(j, i)| {
             let late = centred(all, |l| l.1, j);
             let early = centred(all, |l| l.0, i);
             let label = format!("correlation of {} with {}", outputs[j], inputs[i]);
             let at = |lag| correlation(&late, &early, lag);
-            panel(&label, at, [0, LAGS], is_white.then(|| count(all, j)))
+            panel(&label, at, [0, SHOWN.lags], is_white.then(|| count(all, j)))
         })
         .collect();
     if panels.is_empty() {
         return None;
     }
     let count = panels.len();
+    let lags = SHOWN.lags;
     let description =
-        format!("Cross-correlations of residuals with inputs at lags 0 to {LAGS}, {count} panels.");
+        format!("Cross-correlations of residuals with inputs at lags 0 to {lags}, {count} panels.");
     let axis = ("lag in samples".to_owned(), panels);
     let svg = chart(
         "Correlation of residuals with inputs",
@@ -183,7 +179,7 @@ fn quantiles(names: &[String], all: &[Left<'_>]) -> String {
         values.sort_unstable_by(f64::total_cmp);
         let n = values.len().max(1) as f64;
         let size = (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
-        let every = values.len().div_ceil(QUANTILES).max(1);
+        let every = values.len().div_ceil(SHOWN.quantiles).max(1);
         let points: Vec<(f64, f64)> = (values.iter().enumerate().step_by(every))
             .map(|(i, v)| (normal.inverse_cdf((i as f64 + 0.5) / n), *v))
             .collect();
@@ -220,10 +216,10 @@ mod tests {
         let all: Vec<Left<'_>> = inputs.iter().zip(&outputs).collect();
         let late = centred(&all, |l| l.1, 0);
         let early = centred(&all, |l| l.0, 0);
-        let at: Vec<f64> = (0..=LAGS)
+        let at: Vec<f64> = (0..=SHOWN.lags)
             .map(|lag| correlation(&late, &early, lag))
             .collect();
-        let band = BAND / (count(&all, 0) as f64).sqrt();
+        let band = SHOWN.white_band / (count(&all, 0) as f64).sqrt();
         assert!(at[3] > 0.99, "{at:?}");
         let outside = at.iter().filter(|r| r.abs() > 2.0 * band).count();
         assert_eq!(outside, 1, "{at:?}");

@@ -64,13 +64,7 @@ impl Study {
         settings: &FitSettings,
         progress: &Progress,
     ) -> Result<Fit, StudyError> {
-        let level = settings.level;
-        SettingError::unless(
-            level > 0.0 && level < 1.0,
-            "level",
-            level,
-            "choose a level between 0 and 1, such as 0.9",
-        )?;
+        SettingError::unless_level("level", settings.level, 0.9)?;
         for record in records {
             self.check_channels(record)?;
         }

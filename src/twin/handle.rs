@@ -286,55 +286,24 @@ impl DigitalTwin for Twin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{Adaptation, Interval, NoiseLevel, Now, StartLevel, StateSpace, adapt, fix};
+    use crate::twin::fixture::{OneState, Unseen};
+    use crate::twin::{Adaptation, Interval, NoiseLevel, StartLevel, adapt, fix};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// ẋ = −k·x, y = x with a noisy sensor.
-    struct Decay;
-    impl StateSpace for Decay {
-        fn outline(&self) -> Outline {
-            Outline::new()
-                .parameter(Parameter::new("k", "1/s", 0.5, 2.0))
-                .state("x", "-")
-                .output("y", "-")
-        }
-        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-            dx[0] = -now.theta[0] * x[0];
-        }
-        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-            y[0] = x[0];
-        }
-        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
-            x[0] = 1.0;
-        }
-        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
-            measurement[0] = 0.1;
-        }
-    }
-
-    /// The same without its equations.
-    struct Boxed;
-    impl DigitalTwin for Boxed {
-        fn parameters(&self) -> ParameterSpace {
-            DigitalTwin::parameters(&Decay)
-        }
-        fn signals(&self) -> Signals {
-            DigitalTwin::signals(&Decay)
-        }
-        fn simulate(
-            &self,
-            theta: &[f64],
-            drive: &Drive,
-            noise: Noise,
-        ) -> Result<Signal, SimulationError> {
-            DigitalTwin::simulate(&Decay, theta, drive, noise)
+    fn decay() -> OneState {
+        OneState {
+            inputs: 0,
+            start: Some(1.0),
+            noise: [0.0, 0.1],
+            ..OneState::leaking(Parameter::new("k", "1/s", 0.5, 2.0))
         }
     }
 
     #[test]
     fn a_watched_twin_runs_as_before_and_each_run_is_seen() {
         let drive = Drive::autonomous(0.1, 20).unwrap();
-        for (twin, runs) in [(Twin::new(Decay), 1), (Twin::new(Boxed), 32)] {
+        for (twin, runs) in [(Twin::new(decay()), 1), (Twin::new(Unseen(decay())), 32)] {
             let seen = Arc::new(AtomicUsize::new(0));
             let counter = seen.clone();
             let watched = twin.watched(move || {
@@ -349,7 +318,7 @@ mod tests {
             assert_eq!(seen.load(Ordering::Relaxed), 1 + runs);
             assert_eq!(twin.runs_of_a_free_run(), runs);
         }
-        let stopped = Twin::new(Decay).watched(|| Err(SimulationError::fatal("stop")));
+        let stopped = Twin::new(decay()).watched(|| Err(SimulationError::fatal("stop")));
         assert!(stopped.simulate(&[1.0], &drive, Noise::OFF).is_err());
     }
 
@@ -361,18 +330,18 @@ mod tests {
             start: [("x".to_owned(), StartLevel::Estimate)].into(),
             ..Adaptation::default()
         };
-        let twin = adapt(Twin::new(Decay), &adaptation, 0.1).unwrap();
+        let twin = adapt(Twin::new(decay()), &adaptation, 0.1).unwrap();
         assert_eq!(twin.parameters().names(), ["k", "noise.y", "start.x"]);
         let drive = Drive::autonomous(0.1, 20).unwrap();
         let noise = Noise::new(1, "adapted", 0);
-        let own = Twin::new(Decay).simulate(&[1.0], &drive, noise).unwrap();
+        let own = Twin::new(decay()).simulate(&[1.0], &drive, noise).unwrap();
         let run = |twin: &Twin, theta: &[f64]| twin.simulate(theta, &drive, noise).unwrap();
         assert_eq!(run(&twin, &[1.0, 0.1, 1.0]), own);
         let silent = run(&twin, &[1.0, 0.0, 3.0]);
         assert_eq!((silent[[0, 0]], silent[[1, 0]]), (3.0, 2.7));
         let held = fix(twin, &[("noise.y".to_owned(), 0.1)].into()).unwrap();
         assert_eq!(run(&held, &[1.0, 1.0]), own);
-        let refused = adapt(Twin::new(Boxed), &adaptation, 0.1).err();
+        let refused = adapt(Twin::new(Unseen(decay())), &adaptation, 0.1).err();
         assert_eq!(refused, Some(TwinError::BlackBox("noise")));
     }
 }

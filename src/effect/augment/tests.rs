@@ -3,25 +3,9 @@
 use super::*;
 use crate::effect::{Catalogue, EffectKind, Magnitude, OtherState};
 use crate::record::{Drive, Signal};
-use crate::twin::{Acting, DigitalTwin, Hold, Noise, ParameterSpace, Stepping};
+use crate::twin::fixture::Unseen;
+use crate::twin::{Acting, Hold, Noise, Stepping};
 use crate::twins::CascadedTanks;
-
-/// The tanks without their equations.
-struct Unseen;
-
-impl DigitalTwin for Unseen {
-    fn parameters(&self) -> ParameterSpace {
-        DigitalTwin::parameters(&CascadedTanks)
-    }
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        CascadedTanks.simulate(theta, drive, noise)
-    }
-}
 
 /// A run keeps two samples of a delay in its states, and holds its outputs back by the rest: that is the register of the law, to the
 /// last bits, and noise comes behind it.
@@ -35,7 +19,7 @@ fn a_delayed_output_is_that_of_the_law() {
     let u = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 9) % 5) as f64 / 2.0);
     let drive = Drive::new(0.5, u).unwrap();
     // A black box passes its whole outputs through the law.
-    let whole = augment(Twin::new(Unseen), vec![delay]).unwrap();
+    let whole = augment(Twin::new(Unseen(CascadedTanks)), vec![delay]).unwrap();
     for delay in [0.0, 0.1, 0.7, 1.5, 10.0, 12.3, 31.5] {
         let theta = [0.6, 0.5, 0.55, 1.0, delay];
         let expected = whole.simulate(&theta, &drive, Noise::OFF).unwrap();

@@ -197,32 +197,16 @@ impl<'a> TwinStep<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Quantity, Signal};
-    use crate::twin::{DigitalTwin, Noise, Outline, Parameter, StateSpace};
+    use crate::record::Signal;
+    use crate::twin::fixture::OneState;
+    use crate::twin::{DigitalTwin, Noise, Parameter};
 
     /// ẋ = −k·x + u, measured well.
-    struct Leak;
-    impl StateSpace for Leak {
-        fn outline(&self) -> Outline {
-            Outline {
-                parameters: ParameterSpace::new([
-                    Parameter::new("k", "1/s", 0.5, 1.5).within(0.1, 4.0)
-                ]),
-                states: vec![Quantity::new("x", "m")],
-                inputs: vec![Quantity::new("u", "m/s")],
-                outputs: vec![Quantity::new("y", "m")],
-                ..Outline::new()
-            }
-        }
-        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-            dx[0] = now.u[0] - now.theta[0] * x[0];
-        }
-        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-            y[0] = x[0];
-        }
-        fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
-            process[0] = 0.003;
-            measurement[0] = 0.02;
+    fn leak() -> OneState {
+        let k = Parameter::new("k", "1/s", 0.5, 1.5).within(0.1, 4.0);
+        OneState {
+            noise: [0.003, 0.02],
+            ..OneState::leaking(k)
         }
     }
 
@@ -231,12 +215,12 @@ mod tests {
         let inputs = Signal::from_shape_fn((600, 1), |(k, _)| [1.0, -0.5, 2.0][k / 50 % 3]);
         let drive = Drive::new(0.1, inputs).unwrap();
         for run in 0..6 {
-            let outputs = Leak
+            let outputs = leak()
                 .simulate(&[1.4], &drive, Noise::new(1, "dual", run))
                 .unwrap();
             let record = Record::new(drive.clone(), outputs).unwrap();
             for start in [0.7, 2.5] {
-                let theta = dual_filter(&Leak.into(), &record, &[start]).unwrap();
+                let theta = dual_filter(&leak().into(), &record, &[start]).unwrap();
                 assert!((theta[0] - 1.4).abs() < 0.05, "from {start}: {theta:?}");
             }
         }
@@ -246,7 +230,7 @@ mod tests {
     fn it_stays_in_the_bounds() {
         let drive = Drive::new(0.1, Signal::ones((50, 1))).unwrap();
         let record = Record::new(drive, Signal::from_elem((50, 1), 40.0)).unwrap();
-        let theta = dual_filter(&Leak.into(), &record, &[9.0]).unwrap();
+        let theta = dual_filter(&leak().into(), &record, &[9.0]).unwrap();
         assert!((0.1..=4.0).contains(&theta[0]), "{theta:?}");
     }
 

@@ -43,8 +43,7 @@ pub struct MonteCarlo {
 impl MonteCarlo {
     /// Checks that the study has this scenario; worth asking before an estimator is trained.
     pub fn check(&self, study: &Study) -> Result<(), EvaluateError> {
-        let limit = format!("choose at most {MOST_RECORDS}");
-        SettingError::unless(self.runs <= MOST_RECORDS, "runs", self.runs, limit)?;
+        SettingError::unless_at_most("runs", self.runs, MOST_RECORDS)?;
         self.draws(study).map(|_| ())
     }
 

@@ -65,13 +65,7 @@ impl<'a> Withheld<'a> {
         if settings.trials == 0 {
             return Err(EvaluateError::Nothing("trials"));
         }
-        let limit = format!("choose at most {MOST_RECORDS}");
-        SettingError::unless(
-            settings.trials <= MOST_RECORDS,
-            "trials",
-            settings.trials,
-            limit,
-        )?;
+        SettingError::unless_at_most("trials", settings.trials, MOST_RECORDS)?;
         if settings.kinds.is_empty() {
             return Err(EvaluateError::Nothing("kinds"));
         }

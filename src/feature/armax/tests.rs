@@ -1,7 +1,7 @@
 //! ARMAX features of records whose process is known.
 
 use super::*;
-use crate::feature::testing::Tank;
+use crate::feature::testing::tank;
 use crate::twin::Noise;
 
 const ORDERS: Armax = Armax {
@@ -12,7 +12,7 @@ const ORDERS: Armax = Armax {
 
 /// A tank with `inputs` inputs: one state, process and measurement noise, so ARMAX(1, 1, 1) exactly.
 fn record(inputs: usize, samples: usize) -> (Twin, Drive, Signal) {
-    let twin = Twin::new(Tank(inputs));
+    let twin = Twin::new(tank(inputs));
     let levels = Signal::from_shape_fn((samples, inputs), |(k, _)| f64::from(k / 20 % 2 == 0));
     let drive = Drive::new(0.1, levels).unwrap();
     let y = twin

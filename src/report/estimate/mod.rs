@@ -4,7 +4,7 @@ mod together;
 
 pub(crate) use together::{together_document, together_json};
 
-use super::digits::{probability, short, unit_suffix};
+use super::digits::{SHOWN, probability, short, unit_suffix};
 use super::document::{Block, Document, Picture, Section};
 use super::fit::draws;
 use super::parameters::{ParameterRow, priors, values};
@@ -18,11 +18,6 @@ use crate::setting::number;
 use crate::study::Study;
 use crate::twin::Role;
 use serde_json::{Value, json};
-
-/// Weak combinations that are shown.
-const COMBINATIONS: usize = 2;
-/// Characters of a combination.
-const LONGEST: usize = 90;
 
 /// One line of the table a parameter, in the order of θ.
 fn rows(study: &Study, estimate: &Estimate) -> Vec<ParameterRow> {
@@ -136,18 +131,18 @@ fn weak(estimate: &Estimate) -> Vec<Block> {
     if weak.is_empty() {
         return vec![];
     }
-    let mut items: Vec<String> = (weak.iter().take(COMBINATIONS))
+    let mut items: Vec<String> = (weak.iter().take(SHOWN.combinations))
         .map(|direction| {
             let all = &direction.combination;
-            let mut shown: String = all.chars().take(LONGEST).collect();
+            let mut shown: String = all.chars().take(SHOWN.combination).collect();
             if shown.len() < all.len() {
                 shown.push('…');
             }
             format!("{shown} ± {}", short(direction.std_error))
         })
         .collect();
-    if weak.len() > COMBINATIONS {
-        items.push(format!("… and {} more", weak.len() - COMBINATIONS));
+    if weak.len() > SHOWN.combinations {
+        items.push(format!("… and {} more", weak.len() - SHOWN.combinations));
     }
     let lead = format!(
         "The record does not identify {} of {} parameter combinations (± in prior widths); moves along them hardly change the record:",

@@ -3,17 +3,12 @@
 use super::estimate_json;
 use crate::estimator::{INTERVAL_LEVEL, Together};
 use crate::fit::Warning;
-use crate::report::digits::{probability, short, with_error};
+use crate::report::digits::{SHOWN, probability, short, with_error};
 use crate::report::document::Column::{Number, Text};
 use crate::report::document::{Block, Document, Section};
 use crate::report::parameters::{ParameterRow, values};
 use crate::study::Study;
 use serde_json::{Value, json};
-
-/// Level below which records are said to disagree.
-const LEVEL: f64 = 0.01;
-/// Parameters of each record that are shown.
-const SHOWN: usize = 6;
 
 /// One line of the shared table a parameter.
 fn rows(study: &Study, all: &Together) -> Vec<ParameterRow> {
@@ -51,7 +46,7 @@ pub(crate) fn together_json(study: &Study, all: &Together, files: &[String]) -> 
             "statistic": all.disagreement,
             "degrees": all.degrees,
             "p_value": all.p_value,
-            "agree": all.p_value >= LEVEL,
+            "agree": all.p_value >= SHOWN.disagreement,
         },
         "records": records.collect::<Vec<_>>(),
     })
@@ -59,7 +54,7 @@ pub(crate) fn together_json(study: &Study, all: &Together, files: &[String]) -> 
 
 /// Agreement of the records, the shared table, then one line a record, and the warnings of each.
 pub(crate) fn together_document(study: &Study, all: &Together, files: &[String]) -> Document {
-    let names: Vec<&String> = all.names.iter().take(SHOWN).collect();
+    let names: Vec<&String> = all.names.iter().take(SHOWN.of_record).collect();
     let mut head = vec![("record", Text)];
     head.extend(names.iter().map(|name| (name.as_str(), Number)));
     head.push(("consistent", Text));
@@ -86,7 +81,7 @@ pub(crate) fn together_document(study: &Study, all: &Together, files: &[String])
         all.degrees,
         probability(all.p_value),
     );
-    let agree = all.p_value >= LEVEL;
+    let agree = all.p_value >= SHOWN.disagreement;
     let [word, why, next] = match agree {
         true => [
             "agree",

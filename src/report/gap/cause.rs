@@ -3,16 +3,11 @@
 use super::pictures;
 use super::statement::{Names, accepted_ids, rivals};
 use crate::diagnose::{Cause, Decision, Detection, Diagnosis, EffectFit, RIVALS, Verdict};
-use crate::report::digits::{Digits, chance, percent, probability, short};
+use crate::report::digits::{Digits, SHOWN, chance, percent, probability, short};
 use crate::report::document::Column::{Number, Text};
 use crate::report::document::{Block, Section};
 use crate::report::units::Units;
 use crate::study::Study;
-
-/// Effects on the terminal.
-const SHOWN: usize = 4;
-/// Terms of a missing function that a sentence names.
-const TERMS: usize = 3;
 
 pub(super) fn section(units: &Units, diagnosis: &Diagnosis) -> Section {
     let cause = &diagnosis.cause;
@@ -31,9 +26,9 @@ pub(super) fn section(units: &Units, diagnosis: &Diagnosis) -> Section {
         brief.push(Block::table(
             "",
             &head,
-            rows.iter().take(SHOWN).cloned().collect(),
+            rows.iter().take(SHOWN.effects).cloned().collect(),
         ));
-        if rows.len() > SHOWN {
+        if rows.len() > SHOWN.effects {
             let table = Block::table("", &head, rows);
             rest.push(Block::folded("All effects", vec![table]));
         }
@@ -181,7 +176,7 @@ fn remains(cause: &Cause) -> Option<String> {
 /// Terms of the missing function: exploratory, no test. `None` where nothing was explored.
 pub(super) fn discovery(study: &Study, diagnosis: &Diagnosis) -> Option<Section> {
     let d = diagnosis.discovery.as_ref()?;
-    let terms: Vec<String> = (d.terms.iter().take(TERMS))
+    let terms: Vec<String> = (d.terms.iter().take(SHOWN.terms))
         .map(|t| {
             format!(
                 "{} · {} ({})",

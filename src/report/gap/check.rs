@@ -2,13 +2,10 @@
 
 use super::pictures;
 use crate::diagnose::{Diagnosis, HiddenDisturbance, Predicted, PredictiveCheck};
-use crate::report::digits::{chance, percent, short, with_unit};
+use crate::report::digits::{SHOWN, chance, percent, short, with_unit};
 use crate::report::document::Block;
 use crate::report::document::Column::{Number, Text};
 use crate::report::units::Units;
-
-/// Bursts that the text names.
-const NAMED: usize = 3;
 
 /// The outcome of the check in one sentence; none where there was none.
 pub(super) fn outcome(diagnosis: &Diagnosis) -> Option<String> {
@@ -68,13 +65,13 @@ fn words(units: &Units, disturbance: &HiddenDisturbance) -> String {
     );
     if let Some(scale) = disturbance.time_scale {
         text += &format!(" It is clearest over {} s", short(scale));
-        let named = disturbance.bursts.iter().take(NAMED);
+        let named = disturbance.bursts.iter().take(SHOWN.bursts);
         let named: Vec<String> = named
             .map(|burst| format!("{} to {} s", short(burst.start), short(burst.end)))
             .collect();
         match disturbance.bursts.len() {
             0 => {}
-            count if count <= NAMED => text += &format!(": {}", named.join(", ")),
+            count if count <= SHOWN.bursts => text += &format!(": {}", named.join(", ")),
             count => text += &format!(": {count} times, first {}", named.join(", ")),
         }
         text += ".";

@@ -4,13 +4,10 @@ use super::statement::{accepted_ids, accepted_places, places};
 use super::words::{few, joined};
 use super::{check, pictures};
 use crate::diagnose::{Diagnosis, Maps, Verdict};
-use crate::report::digits::{chance, short, unit_suffix};
+use crate::report::digits::{SHOWN, chance, short, unit_suffix};
 use crate::report::document::{Block, Section};
 use crate::report::units::Units;
 use crate::study::Study;
-
-/// Windows and ranges that the terminal names.
-const NAMED: usize = 2;
 
 pub(super) fn section(study: &Study, diagnosis: &Diagnosis) -> Section {
     let units = Units::of(study);
@@ -116,9 +113,9 @@ fn place(units: &Units, diagnosis: &Diagnosis) -> Option<String> {
         ));
     }
     let maps = location.maps.notable();
-    let when = (maps.windows.iter().take(NAMED))
+    let when = (maps.windows.iter().take(SHOWN.windows))
         .map(|w| format!("{} to {} s", short(w.start), short(w.end)));
-    let regions = maps.regions.iter().take(NAMED).map(|r| {
+    let regions = maps.regions.iter().take(SHOWN.windows).map(|r| {
         let unit = unit_suffix(units.variable(&r.variable));
         format!(
             "{} in {} … {}{unit}",

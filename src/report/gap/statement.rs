@@ -1,21 +1,13 @@
 //! The answer in words: headline, what follows from it, what to do next. All of it follows from verdict, decision and probabilities.
 
 use super::share::share_with_interval;
-use super::words::{MOST_NAMES, effect, effects, few, joined};
+use super::words::{effect, effects, few, joined};
 use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, Verdict};
 use crate::report::NEXT_INPUT;
-use crate::report::digits::{chance, percent, short, with_unit};
+use crate::report::digits::{SHOWN, chance, percent, short, with_unit};
 use crate::report::units::Units;
 use crate::twin::{Hold, Integrator};
 
-/// Characters of a headline: two lines of a page.
-const LONGEST: usize = 140;
-/// Probability from which a name is stated.
-pub(super) const SAID: f64 = 0.5;
-/// Probability that nothing is missing below which *no gap* is said with a reservation.
-const CLEAR: f64 = 0.9;
-/// Words of the answer: with heading and caption there are at most 60 on the first screen.
-const WORDS: usize = 46;
 const APART: &str = "this record cannot tell which";
 
 /// The effects of an answer by how sure they are.
@@ -35,7 +27,7 @@ impl<'d> Names<'d> {
         let is_in = |list: &[String], e: &EffectFit| list.contains(&e.key());
         let meant =
             (cause.effects.iter()).filter(|e| is_in(&cause.accepted, e) || is_in(&cause.class, e));
-        let (sure, mut open): (Vec<_>, Vec<_>) = meant.partition(|e| e.probability >= SAID);
+        let (sure, mut open): (Vec<_>, Vec<_>) = meant.partition(|e| e.probability >= SHOWN.stated);
         let most = open.iter().map(|e| e.probability).fold(0.0, f64::max);
         // Of two that are together more probable than one, one is no rival of the other.
         let (known, rivals): (Vec<_>, Vec<_>) = sure
@@ -69,7 +61,7 @@ fn all_keys<'e>(effects: &[&'e EffectFit]) -> Vec<String> {
     effects.iter().flat_map(keys).collect()
 }
 
-/// The answer in one sentence, of at most [`LONGEST`] characters where names allow it.
+/// The answer in one sentence, of at most `SHOWN.headline` characters where names allow it.
 pub(super) fn headline(units: &Units, diagnosis: &Diagnosis) -> String {
     let cause = &diagnosis.cause;
     let nothing = cause.probabilities.nothing;
@@ -80,7 +72,7 @@ pub(super) fn headline(units: &Units, diagnosis: &Diagnosis) -> String {
         (Verdict::ParameterGap, _) if diagnosis.interrupted => {
             "Not finished: parameters lie outside the prior; the search for missing effects was interrupted.".into()
         }
-        (Verdict::NoGap, _) if nothing < CLEAR => format!(
+        (Verdict::NoGap, _) if nothing < SHOWN.clear => format!(
             "No clear gap: something may be missing (probability {}), too little to call.",
             chance(1.0 - nothing)
         ),
@@ -157,8 +149,8 @@ fn lacking(units: &Units, diagnosis: &Diagnosis) -> String {
             "and"
         };
         let known = list(&names.known, last);
-        let open = match (count <= MOST_NAMES, names.open.first()) {
-            (false, Some(first)) if lead && first.probability >= SAID => {
+        let open = match (count <= SHOWN.names, names.open.first()) {
+            (false, Some(first)) if lead && first.probability >= SHOWN.stated => {
                 format!(
                     "one of {count} effects, most likely {}",
                     list(&[*first], "or")
@@ -245,7 +237,8 @@ pub(super) fn somewhere(units: &Units, location: &Location) -> Option<[String; 2
     if location.class.is_empty() {
         return Some([named.clone(), named]);
     }
-    let is_likely = (location.targets.iter()).any(|t| t.target == *target && t.probability >= SAID);
+    let is_likely =
+        (location.targets.iter()).any(|t| t.target == *target && t.probability >= SHOWN.stated);
     let lead = match is_likely {
         true => format!(", most likely {named}"),
         false => String::new(),
@@ -254,7 +247,7 @@ pub(super) fn somewhere(units: &Units, location: &Location) -> Option<[String; 2
     let all: Vec<String> = (location.class.iter())
         .map(|place| units.in_words(place))
         .collect();
-    let named = match all.len() <= MOST_NAMES {
+    let named = match all.len() <= SHOWN.names {
         true => joined(&all, "or"),
         false => counted.clone(),
     };
@@ -266,7 +259,7 @@ fn short_enough(sentences: impl IntoIterator<Item = String>) -> String {
     let mut last = String::new();
     for sentence in sentences {
         last = sentence;
-        if last.chars().count() <= LONGEST {
+        if last.chars().count() <= SHOWN.headline {
             break;
         }
     }
@@ -275,7 +268,8 @@ fn short_enough(sentences: impl IntoIterator<Item = String>) -> String {
 
 /// The accepted effects by id where each is more probable than not, or else without names.
 pub(super) fn accepted_ids(cause: &Cause) -> String {
-    let is_said = |e: &&EffectFit| e.probability >= SAID && cause.accepted.contains(&e.key());
+    let is_said =
+        |e: &&EffectFit| e.probability >= SHOWN.stated && cause.accepted.contains(&e.key());
     match cause.effects.iter().filter(is_said).count() == cause.accepted.len() {
         true => cause.accepted.join(" and "),
         false => "the accepted effects".into(),
@@ -289,7 +283,8 @@ pub(super) fn details(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
     let mut all: Vec<String> = how_sure(diagnosis, &names).into_iter().collect();
     all.extend(how_far(diagnosis));
     let told = [headline(units, diagnosis), next(diagnosis), all.join(" ")];
-    let mut left = WORDS.saturating_sub(told.iter().map(|text| words(text)).sum());
+    let said: usize = told.iter().map(|text| words(text)).sum();
+    let mut left = SHOWN.answer_words.saturating_sub(said);
     let accepted = (names.known.iter()).filter(|e| cause.accepted.contains(&e.key()));
     for text in accepted.filter_map(|e| sentence(units, e)) {
         if cause.decision != Decision::Class && words(&text) <= left {
@@ -312,7 +307,7 @@ fn how_sure(diagnosis: &Diagnosis, names: &Names<'_>) -> Option<String> {
     let kinds = &cause.probabilities;
     let p = match (diagnosis.verdict, cause.decision) {
         (Verdict::NoGap | Verdict::ParameterGap, _) if diagnosis.interrupted => return None,
-        (Verdict::NoGap, _) if kinds.nothing >= CLEAR => kinds.nothing,
+        (Verdict::NoGap, _) if kinds.nothing >= SHOWN.clear => kinds.nothing,
         (Verdict::StructuralGap, Decision::Named | Decision::Partial) if names.open.is_empty() => {
             names
                 .known
@@ -424,7 +419,7 @@ pub(super) fn next(diagnosis: &Diagnosis) -> String {
             let [step, wrong] = other_step(diagnosis).unwrap_or_default();
             format!("give the study {step}; {wrong}")
         }
-        (Verdict::NoGap, _) if cause.probabilities.nothing < CLEAR => {
+        (Verdict::NoGap, _) if cause.probabilities.nothing < SHOWN.clear => {
             "a longer record, or another one, decides".into()
         }
         (Verdict::NoGap, _) => "use the twin, within the range of this record".into(),
@@ -442,7 +437,7 @@ pub(super) fn next(diagnosis: &Diagnosis) -> String {
         (_, Decision::Class | Decision::Named | Decision::Partial) => {
             "another record, with other inputs, may tell them apart".into()
         }
-        _ if cause.probabilities.unknown < SAID => {
+        _ if cause.probabilities.unknown < SHOWN.stated => {
             "a longer record, or several, may name it".into()
         }
         _ => "look at the system there, with the missing function in mind".into(),

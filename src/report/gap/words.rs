@@ -1,10 +1,9 @@
 //! Names of effects and lists of names, in words.
 
 use crate::effect::EffectKey;
+use crate::report::digits::SHOWN;
 use crate::report::units::Units;
 
-/// Names in one sentence.
-pub(super) const MOST_NAMES: usize = 3;
 /// Kinds of target that an id may begin with: the place says them again.
 const KINDS: [&str; 4] = ["sensor-", "actuator-", "state-", "parameter-"];
 /// Last words of nouns that take no article.
@@ -73,7 +72,7 @@ pub(super) fn joined<S: AsRef<str>>(names: &[S], last: &str) -> String {
     let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     match names.split_last() {
         Some((_, [])) | None => names.concat(),
-        Some((end, before)) if names.len() <= MOST_NAMES => {
+        Some((end, before)) if names.len() <= SHOWN.names => {
             format!("{} {last} {end}", before.join(", "))
         }
         Some(_) => few(&names),
@@ -82,10 +81,10 @@ pub(super) fn joined<S: AsRef<str>>(names: &[S], last: &str) -> String {
 
 /// Returns `A, B, C`; of more than three names three, and the number of the others.
 pub(super) fn few<S: AsRef<str>>(names: &[S]) -> String {
-    let shown: Vec<&str> = names.iter().take(MOST_NAMES).map(AsRef::as_ref).collect();
+    let shown: Vec<&str> = names.iter().take(SHOWN.names).map(AsRef::as_ref).collect();
     let shown = shown.join(", ");
     match names.len() {
-        n if n > MOST_NAMES => format!("{shown} and {} more", n - MOST_NAMES),
+        n if n > SHOWN.names => format!("{shown} and {} more", n - SHOWN.names),
         _ => shown,
     }
 }

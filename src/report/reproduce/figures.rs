@@ -5,7 +5,7 @@ use crate::evaluate::baseline::Initialisation::Bad;
 use crate::evaluate::paper::{AnswerRuns, MeanRuns, PointScore, ScoredMethod};
 use crate::record::Signal;
 use crate::report::chart::{Dot, Dots, Line, Panel, Span, Style, chart, roomy};
-use crate::report::digits::{in_unit, named};
+use crate::report::digits::{SHOWN, in_unit, named};
 use crate::study::Study;
 use crate::twin::Parameter;
 
@@ -114,9 +114,6 @@ fn panel(
     Panel::new(title, series.collect()).height(150.0)
 }
 
-/// Parameters that are drawn: more panels are a roll, not a picture.
-const SHOWN: usize = 6;
-
 /// For each parameter, over its true value: the share of intervals that held it, with its 95 % interval, and the root mean square
 /// error of the refitted estimate. Bars below the axes mark the prior. `None` without a grid.
 pub fn coverage_svg(study: &Study, points: &[PointScore]) -> Option<String> {
@@ -133,7 +130,7 @@ pub fn coverage_svg(study: &Study, points: &[PointScore]) -> Option<String> {
     let panels = space
         .iter()
         .enumerate()
-        .take(SHOWN)
+        .take(SHOWN.panels)
         .flat_map(|(j, parameter)| {
             let dots = |dot: &dyn Fn(&PointScore) -> Dot| -> Vec<Dot> {
                 let mut dots: Vec<Dot> = points.iter().map(dot).collect();

@@ -277,32 +277,16 @@ mod tests {
     use super::*;
     use crate::evaluate::trials::law::ForceDeparture;
     use crate::evaluate::trials::world::Conditions;
-    use crate::twin::{DigitalTwin, Integrator, Outline, Parameter};
+    use crate::twin::fixture::OneState;
+    use crate::twin::{DigitalTwin, Integrator, Parameter};
 
     /// ẋ = −k·x + u, y = x, with noise.
-    struct Decay(f64);
-    impl crate::twin::StateSpace for Decay {
-        fn outline(&self) -> Outline {
-            Outline::new()
-                .parameter(Parameter::new("k", "1/s", 0.2, 2.0))
-                .state("x", "m")
-                .input("u", "m/s")
-                .output("y", "m")
-        }
-        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-            dx[0] = now.u[0] - now.theta[0] * x[0];
-        }
-        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-            y[0] = x[0];
-        }
-        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
-            x[0] = 1.0;
-        }
-        fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
-            (process[0], measurement[0]) = (self.0, self.0);
-        }
-        fn integrator(&self) -> Integrator {
-            Integrator::RungeKutta4
+    fn decay(noise: f64) -> OneState {
+        OneState {
+            start: Some(1.0),
+            noise: [noise; 2],
+            integrator: Integrator::RungeKutta4,
+            ..OneState::leaking(Parameter::new("k", "1/s", 0.2, 2.0))
         }
     }
 
@@ -318,7 +302,7 @@ mod tests {
             conditions,
         };
         run(
-            &Decay(noise).into(),
+            &decay(noise).into(),
             system,
             &drive,
             draws(Noise::new(1, "w", 0)),
@@ -330,7 +314,7 @@ mod tests {
     #[test]
     fn a_world_without_departures_is_its_twin() {
         let run = made(0.0, &[], &Conditions::declared());
-        let twin = DigitalTwin::free_run(&Decay(0.0), &[0.7], &run.drive).unwrap();
+        let twin = DigitalTwin::free_run(&decay(0.0), &[0.7], &run.drive).unwrap();
         for (a, b) in run.outputs.iter().zip(&twin) {
             assert!((a - b).abs() < 1e-6, "{a} {b}");
         }
@@ -361,7 +345,7 @@ mod tests {
             conditions: &conditions,
         };
         let run = run(
-            &Decay(0.01).into(),
+            &decay(0.01).into(),
             system,
             &drive,
             draws(Noise::new(1, "w", 0)),

@@ -3,13 +3,10 @@
 use crate::diagnose::{Decision, Diagnosis, EffectFit, Horizon, Shrinkage};
 use crate::math::median;
 use crate::report::chart::{Bar, BarGroup, Line, Panel, Style, TimeMark, bar_chart, chart};
-use crate::report::digits::{chance, in_unit, percent, short};
+use crate::report::digits::{SHOWN, chance, in_unit, percent, short};
 use crate::report::gap::share::{measure, share_with_interval};
 use crate::report::units::Units;
 use crate::study::Study;
-
-/// Explanations that are drawn.
-const SHOWN: usize = 8;
 
 /// Listed effects by probability, then the kinds of explanation; `None` where no effect was fitted.
 pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
@@ -20,7 +17,7 @@ pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
         let note = format!("{}, {gain} nats", chance(effect.probability));
         Bar::new(&key, effect.probability, &note).clear(which.accepted.contains(&key))
     };
-    let shown = || which.effects.iter().take(SHOWN);
+    let shown = || which.effects.iter().take(SHOWN.explanations);
     let has_class =
         which.decision != Decision::Absorbed && which.class.len() > which.accepted.len();
     let is_inside = |e: &&EffectFit| has_class && which.class.contains(&e.key());

@@ -2,14 +2,11 @@
 
 use crate::diagnose::{Cell, Diagnosis};
 use crate::report::chart::{Bar, BarGroup, bar_chart};
-use crate::report::digits::{chance, percent, short, with_unit};
+use crate::report::digits::{SHOWN, chance, percent, short, with_unit};
 use crate::report::gap::statement::places;
 use crate::report::units::Units;
 use crate::study::Study;
 use std::collections::BTreeMap;
-
-/// Shares that are drawn: what rounds to nothing is left to the JSON.
-const VISIBLE: f64 = 0.005;
 
 /// Places in the twin by the probability of what explains the records there; `None` where nothing was looked for.
 pub fn targets(diagnosis: &Diagnosis) -> Option<String> {
@@ -17,7 +14,7 @@ pub fn targets(diagnosis: &Diagnosis) -> Option<String> {
     let first = targets.first()?;
     let answer = places(diagnosis);
     let bars = (targets.iter())
-        .filter(|t| t.probability >= VISIBLE || answer.contains(&t.target.as_str()))
+        .filter(|t| t.probability >= SHOWN.visible || answer.contains(&t.target.as_str()))
         .map(|t| {
             let is_answer = answer.contains(&t.target.as_str());
             Bar::new(&t.target, t.probability, &chance(t.probability)).clear(is_answer)
@@ -40,7 +37,7 @@ fn shares<C: Cell>(
 ) -> Option<String> {
     let (group, _, name) = at(cells.first()?);
     let mut groups: BTreeMap<String, Vec<(f64, Bar)>> = BTreeMap::new();
-    for cell in cells.iter().filter(|cell| cell.share() >= VISIBLE) {
+    for cell in cells.iter().filter(|cell| cell.share() >= SHOWN.visible) {
         let (group, place, name) = at(cell);
         let bar = Bar::new(&name, cell.share(), &percent(cell.share()));
         groups.entry(group).or_default().push((place, bar));

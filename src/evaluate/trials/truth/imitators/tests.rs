@@ -5,43 +5,25 @@ use crate::evaluate::trials::law::DeparturePlace;
 use crate::evaluate::trials::places::TwinPlaces;
 use crate::evaluate::trials::truth::fixture::experiment;
 use crate::study::{RecordPlan, Study};
-use crate::twin::{Now, Outline, Parameter, StateSpace, Stepping};
+use crate::twin::Parameter;
+use crate::twin::fixture::OneState;
 
 /// A leaking vessel whose level and input are never near zero: ḣ = u − k·h, u from 1 to 3.
-struct Vessel;
-
-impl StateSpace for Vessel {
-    fn outline(&self) -> Outline {
-        Outline::new()
-            .parameter(Parameter::new("k", "1/s", 0.3, 1.5).within(0.1, 4.0))
-            .state("h", "m")
-            .input("u", "m/s")
-            .output("y", "m")
-    }
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        dx[0] = now.u[0] - now.theta[0] * x[0];
-    }
-    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        y[0] = x[0];
-    }
-    fn start(&self, _: &Now<'_>, x: &mut [f64]) {
-        x[0] = 2.0;
-    }
-    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
-        (process[0], measurement[0]) = (0.01, 0.02);
-    }
-    fn stepping(&self) -> Stepping {
-        Stepping {
-            substeps: 10,
-            ..Stepping::default()
-        }
+fn vessel() -> OneState {
+    let k = Parameter::new("k", "1/s", 0.3, 1.5).within(0.1, 4.0);
+    OneState {
+        state: "h",
+        start: Some(2.0),
+        noise: [0.01, 0.02],
+        substeps: 10,
+        ..OneState::leaking(k)
     }
 }
 
 /// Right answers to a departure of about 40 nats; its rival is none of them and leaves less than all.
 fn right(id: &str, place: DeparturePlace, sign: f64) -> Vec<String> {
     let plan = RecordPlan::levels(0.3, 200, 1.0, 3.0, 10);
-    let study = Study::new("vessel", Vessel, plan).unwrap();
+    let study = Study::new("vessel", vessel(), plan).unwrap();
     let listed = Listed::all(&study, &TwinPlaces::new(study.twin()));
     let law = ListedLaw::named(id).unwrap();
     let variant = *Variant::of(law).last().unwrap();

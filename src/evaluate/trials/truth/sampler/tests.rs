@@ -15,7 +15,8 @@ use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::truth::fixture::{experiment, plain};
 use crate::evaluate::trials::truth::sizing::Experiment;
 use crate::study::RecordPlan;
-use crate::twin::{Now, Outline, Parameter, StateSpace};
+use crate::twin::Parameter;
+use crate::twin::fixture::OneState;
 use crate::twins::VanDerPol;
 use own_twin::Tank;
 use rooms::Rooms;
@@ -108,37 +109,16 @@ fn every_kind_can_be_drawn_of_a_twin_of_several_outputs() {
 /// A bias of a sensor of N white samples with noise r has ½·N·(b/r)² nats, less what θ, the start and the noise level imitate.
 #[test]
 fn information_is_that_of_theory() {
-    struct Level;
-    impl StateSpace for Level {
-        fn outline(&self) -> Outline {
-            Outline::new()
-                .parameter(Parameter::new("gain", "1", 0.5, 1.5).within(0.1, 4.0))
-                .state("x", "m")
-                .input("u", "m")
-                .output("y", "m")
-        }
-        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-            // Fast: x follows gain·u within a sample.
-            dx[0] = 20.0 * (now.theta[0] * now.u[0] - x[0]);
-        }
-        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-            y[0] = x[0];
-        }
-        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
-            measurement[0] = 0.1;
-        }
-        fn stepping(&self) -> crate::twin::Stepping {
-            // As fine as the world's: a step that shows would be fitted as noise.
-            crate::twin::Stepping {
-                substeps: 16,
-                ..Default::default()
-            }
-        }
-        fn integrator(&self) -> crate::twin::Integrator {
-            crate::twin::Integrator::RungeKutta4
-        }
-    }
-    let study = Study::new("level", Level, RecordPlan::levels(0.1, 400, -1.0, 1.0, 5)).unwrap();
+    let gain = Parameter::new("gain", "1", 0.5, 1.5).within(0.1, 4.0);
+    let level = OneState {
+        noise: [0.0, 0.1],
+        // As fine as the world's: a step that shows would be fitted as noise.
+        substeps: 16,
+        integrator: crate::twin::Integrator::RungeKutta4,
+        // Fast: x follows gain·u within a sample.
+        ..OneState::new([gain], |theta, u, x| 20.0 * (theta[0] * u[0] - x))
+    };
+    let study = Study::new("level", level, RecordPlan::levels(0.1, 400, -1.0, 1.0, 5)).unwrap();
     experiment(&study, &[1.0], bias_has_its_information);
 }
 
