@@ -52,9 +52,5 @@ pub use outcome::{
 pub(crate) use quantify::share::SHORTEST_SPLIT;
 pub use run::diagnose;
 pub use settings::{Ablation, DiagnoseSettings};
+pub(crate) use thresholds::THRESHOLDS;
 pub(crate) use true_effects::true_fit;
-
-/// Nats within which explanations are rivals.
-pub(crate) const RIVALS: f64 = thresholds::THRESHOLDS.rivals;
-/// Level of the intervals.
-pub(crate) const INTERVAL_LEVEL: f64 = thresholds::THRESHOLDS.interval_level;

@@ -4,7 +4,7 @@ numbers! {
     /// Tuning constants of a diagnosis: unit and reason of each.
     ///
     /// Numerical tolerances, iterations of a fit and sizes of a search stand beside their use.
-    pub(in crate::diagnose) const THRESHOLDS: Thresholds = {
+    pub(crate) const THRESHOLDS: Thresholds = {
         // Records and reports.
         /// Effects in the report: those below are of no weight.
         reported: usize = 12,

@@ -15,8 +15,6 @@ numbers! {
         headline: usize = 140,
         /// Words of the answer: with heading and caption there are at most 60 on the first screen.
         answer_words: usize = 46,
-        /// Probability from which a name is stated.
-        stated: f64 = 0.5,
         /// Probability that nothing is missing below which *no gap* is said with a reservation.
         clear: f64 = 0.9,
         /// Names in one sentence.

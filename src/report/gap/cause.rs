@@ -2,7 +2,7 @@
 
 use super::pictures;
 use super::statement::{Names, accepted_ids, rivals};
-use crate::diagnose::{Cause, Decision, Detection, Diagnosis, EffectFit, RIVALS, Verdict};
+use crate::diagnose::{Cause, Decision, Detection, Diagnosis, EffectFit, THRESHOLDS, Verdict};
 use crate::report::digits::{Digits, SHOWN, chance, percent, probability, short};
 use crate::report::document::Column::{Number, Text};
 use crate::report::document::{Block, Section};
@@ -103,8 +103,9 @@ fn decision(diagnosis: &Diagnosis) -> String {
         ),
         Decision::Named => "One effect is accepted; no other one comes near it.".into(),
         Decision::Class => format!(
-            "The best explanation is accepted; the record cannot separate it from {} within {RIVALS} nats.",
-            rivals(cause)
+            "The best explanation is accepted; the record cannot separate it from {} within {} nats.",
+            rivals(cause),
+            THRESHOLDS.rivals
         ),
         Decision::Partial if Names::of(cause).is_complete() => format!(
             "{} explains most of the gap; something unknown remains.",
@@ -166,7 +167,7 @@ fn remains(cause: &Cause) -> Option<String> {
     // A class says so itself.
     let alike = match (cause.decision, rivals(cause)) {
         (Decision::Partial, names) if !names.is_empty() => {
-            format!(" Within {RIVALS} nats of these: {names}.")
+            format!(" Within {} nats of these: {names}.", THRESHOLDS.rivals)
         }
         _ => String::new(),
     };

@@ -26,7 +26,7 @@ use super::document::{Block, Document, Picture, Section};
 use super::parameters::{ParameterRow, priors, values};
 use super::residuals::{Left, residual_blocks};
 use super::units::Units;
-use crate::diagnose::{Diagnosis, INTERVAL_LEVEL, Verdict};
+use crate::diagnose::{Diagnosis, THRESHOLDS, Verdict};
 use crate::report::digits::{own_unit, with_error};
 use crate::report::document::Column::{Number, Text};
 use crate::study::Study;
@@ -137,7 +137,7 @@ fn parameters(units: &Units, diagnosis: &Diagnosis) -> Section {
     if !diagnosis.nuisance.is_empty() {
         rest.push(Block::table("Other estimated quantities.", &head, others));
     }
-    Section { rest, ..section }.brief(vec![values(caption, INTERVAL_LEVEL, &rows)])
+    Section { rest, ..section }.brief(vec![values(caption, THRESHOLDS.interval_level, &rows)])
 }
 
 /// Residuals of the accepted twin, folded.

@@ -2,7 +2,7 @@
 
 use super::share::share_with_interval;
 use super::words::{effect, effects, few, joined};
-use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, Verdict};
+use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, THRESHOLDS, Verdict};
 use crate::report::NEXT_INPUT;
 use crate::report::digits::{SHOWN, chance, percent, short, with_unit};
 use crate::report::units::Units;
@@ -27,7 +27,8 @@ impl<'d> Names<'d> {
         let is_in = |list: &[String], e: &EffectFit| list.contains(&e.key());
         let meant =
             (cause.effects.iter()).filter(|e| is_in(&cause.accepted, e) || is_in(&cause.class, e));
-        let (sure, mut open): (Vec<_>, Vec<_>) = meant.partition(|e| e.probability >= SHOWN.stated);
+        let (sure, mut open): (Vec<_>, Vec<_>) =
+            meant.partition(|e| e.probability >= THRESHOLDS.said);
         let most = open.iter().map(|e| e.probability).fold(0.0, f64::max);
         // Of two that are together more probable than one, one is no rival of the other.
         let (known, rivals): (Vec<_>, Vec<_>) = sure
@@ -150,7 +151,7 @@ fn lacking(units: &Units, diagnosis: &Diagnosis) -> String {
         };
         let known = list(&names.known, last);
         let open = match (count <= SHOWN.names, names.open.first()) {
-            (false, Some(first)) if lead && first.probability >= SHOWN.stated => {
+            (false, Some(first)) if lead && first.probability >= THRESHOLDS.said => {
                 format!(
                     "one of {count} effects, most likely {}",
                     list(&[*first], "or")
@@ -238,7 +239,7 @@ pub(super) fn somewhere(units: &Units, location: &Location) -> Option<[String; 2
         return Some([named.clone(), named]);
     }
     let is_likely =
-        (location.targets.iter()).any(|t| t.target == *target && t.probability >= SHOWN.stated);
+        (location.targets.iter()).any(|t| t.target == *target && t.probability >= THRESHOLDS.said);
     let lead = match is_likely {
         true => format!(", most likely {named}"),
         false => String::new(),
@@ -269,7 +270,7 @@ fn short_enough(sentences: impl IntoIterator<Item = String>) -> String {
 /// The accepted effects by id where each is more probable than not, or else without names.
 pub(super) fn accepted_ids(cause: &Cause) -> String {
     let is_said =
-        |e: &&EffectFit| e.probability >= SHOWN.stated && cause.accepted.contains(&e.key());
+        |e: &&EffectFit| e.probability >= THRESHOLDS.said && cause.accepted.contains(&e.key());
     match cause.effects.iter().filter(is_said).count() == cause.accepted.len() {
         true => cause.accepted.join(" and "),
         false => "the accepted effects".into(),
@@ -437,7 +438,7 @@ pub(super) fn next(diagnosis: &Diagnosis) -> String {
         (_, Decision::Class | Decision::Named | Decision::Partial) => {
             "another record, with other inputs, may tell them apart".into()
         }
-        _ if cause.probabilities.unknown < SHOWN.stated => {
+        _ if cause.probabilities.unknown < THRESHOLDS.said => {
             "a longer record, or several, may name it".into()
         }
         _ => "look at the system there, with the missing function in mind".into(),
