@@ -11,14 +11,13 @@
 //! of rows before, which say nothing of the future of an input that nothing feeds back to: all d together must be clear as well. Each is
 //! judged by n·ln(RSS₀/RSS), about χ² where it is zero.
 
+use super::thresholds::THRESHOLDS;
 use crate::hypothesis::term::Term;
 use crate::likelihood::kalman::Filtered;
 use crate::record::Record;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Level of both tests: chance takes one open loop in 10⁴ for a closed one, of inputs that also hold the noise by chance.
-const LEVEL: f64 = 1e-4;
 /// Rows before that are looked at: twice hardly shows more of a state that a few rows tell; half misses a derivative's.
 const BEFORE: usize = 4;
 
@@ -60,7 +59,8 @@ fn responds(filtered: &[Filtered], records: &[Record], i: usize, j: usize) -> bo
         return false;
     };
     let is_clear = |without: f64, with: f64, freedom: usize| {
-        let limit = ChiSquared::new(freedom as f64).map(|chi| chi.inverse_cdf(1.0 - LEVEL));
+        let limit = ChiSquared::new(freedom as f64)
+            .map(|chi| chi.inverse_cdf(1.0 - THRESHOLDS.feedback_level));
         limit.is_ok_and(|limit| y.len() as f64 * (without / with).ln() > limit)
     };
     is_clear(own, noise, 1) && is_clear(noise, before, BEFORE)

@@ -2,15 +2,13 @@
 
 use super::base::Base;
 use super::settings::{Ablation, DiagnoseSettings};
+use super::thresholds::THRESHOLDS;
 use crate::effect::EffectPattern;
 use crate::fit::Passes;
 use crate::hypothesis::search::{Before, Breadth, listed};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use std::sync::Arc;
-
-/// Most effects that are selected.
-const MOST: usize = 3;
 
 /// Adds the listed effect that raises BIC most, one after the other, while one does; returns their keys. `None` for a black box, whose
 /// likelihoods would cost as much as its diagnosis.
@@ -35,7 +33,7 @@ pub(crate) fn greedy(
     let mut model = base.model.clone();
     let breadth = Breadth::of(&model, settings.quick);
     let mut keys = vec![];
-    while keys.len() < MOST {
+    while keys.len() < THRESHOLDS.selected {
         let found = listed(&model, &terms, Before::default(), breadth)?;
         let best = (found.into_iter().next()).filter(|best| best.log_z > model.log_evidence);
         let Some((key, better)) = best.and_then(|best| Some((best.last().key(), best.model?)))

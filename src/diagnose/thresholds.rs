@@ -10,6 +10,14 @@ numbers! {
         reported: usize = 12,
         /// Nats of likelihood within which a listed effect with θ inside the prior absorbs a parameter gap.
         absorbs: f64 = 2.0,
+        /// Functions that are told.
+        functions_told: usize = 3,
+        /// Points at which a function is told.
+        function_points: usize = 33,
+        /// Share of draws of a function below which a term of its law is not told.
+        rare_term: f64 = 0.1,
+        /// Level of both tests for feedback: chance takes one open loop in 10⁴ for a closed one, of inputs that also hold the noise by chance.
+        feedback_level: f64 = 1e-4,
         // Maps of residuals: descriptions.
         /// Standard deviations above white noise of a cell that stands out.
         notable: f64 = 4.0,
@@ -26,6 +34,8 @@ numbers! {
         /// Ends of the bands, in cycles a sample: octaves.
         bands: [f64; 7] = [0.0, 1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5],
         // Extent.
+        /// Largest floor of a free run that has a share, over the variance of y: beyond, noise alone drives a right twin away.
+        follows: f64 = 0.5,
         /// Level of all intervals.
         interval_level: f64 = 0.9,
         /// Horizons of predictions in samples, up to a tenth of the record.
@@ -106,6 +116,8 @@ numbers! {
         outdone: f64 = 0.15,
         /// Evidence from which functions are drawn over the states of the corrected twin, too.
         wider: f64 = 5.0,
+        /// Most effects that a greedy search selects.
+        selected: usize = 3,
         /// Pairs that are kept.
         pairs: usize = 6,
     }

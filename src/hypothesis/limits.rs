@@ -2,7 +2,7 @@
 
 numbers! {
     /// Ranges in which the magnitudes of terms are searched, and when two of them are one.
-    pub(in crate::hypothesis) const TERM: TermLimits = {
+    pub(crate) const TERM: TermLimits = {
         /// Moments of each record at which equations are compared: many more than a law that is not the same could agree at by chance.
         moments: usize = 48,
         /// Largest share of a term's square that another one may not have: rounding makes 10⁻²⁰, and 10⁻³ would show at thousands of nats alone.
@@ -47,6 +47,13 @@ numbers! {
         /// Factor to a change that is seen from one that is not, and how often it is looked for.
         farther: f64 = 1e5,
         looks: usize = 5,
+    }
+}
+
+impl TermLimits {
+    /// Share of a function's whole range at each end that the records do not show.
+    pub(crate) fn unseen(&self) -> f64 {
+        self.margin / (1.0 + 2.0 * self.margin)
     }
 }
 

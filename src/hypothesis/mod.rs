@@ -21,7 +21,7 @@ mod alike;
 pub(crate) mod basis;
 pub(crate) mod entry;
 pub(crate) mod functions;
-mod limits;
+pub(crate) mod limits;
 pub(crate) mod listed;
 mod magnitude;
 pub(crate) mod noise;

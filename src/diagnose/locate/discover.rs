@@ -6,14 +6,13 @@
 
 use super::functions::Curve;
 use crate::diagnose::outcome::{Discovery, Term};
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::math::{quantile, solve_truncated};
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 
 /// Draws of the function.
 const DRAWS: usize = 200;
-/// Share of draws below which a term is not told.
-const RARE: f64 = 0.1;
 
 /// Name and function of a term.
 type Candidate = (String, fn(f64) -> f64);
@@ -84,7 +83,7 @@ pub(in crate::diagnose) fn discover(
             };
             (k, term)
         })
-        .filter(|(_, term)| term.inclusion >= RARE)
+        .filter(|(_, term)| term.inclusion >= THRESHOLDS.rare_term)
         .collect();
     found.sort_by(|a, b| b.1.inclusion.total_cmp(&a.1.inclusion));
     // What the two most frequent ones explain of the function itself.

@@ -1,18 +1,13 @@
 //! Missing functions as they were fitted: values, errors, the range that the records show.
 
 use crate::diagnose::outcome::MissingFunction;
+use crate::diagnose::thresholds::THRESHOLDS;
 use crate::hypothesis::basis::basis;
+use crate::hypothesis::limits::TERM;
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::term::Nature;
 use nalgebra::{DMatrix, DVector};
-
-/// Points at which a function is told.
-const POINTS: usize = 33;
-/// Share of the range of a function at each end that the records do not show.
-const UNSEEN: f64 = 0.2 / 1.4;
-/// Functions that are told.
-const TOLD: usize = 3;
 
 /// Posterior of a fitted function of one variable: means and covariance of its values at points.
 pub(in crate::diagnose) struct Curve {
@@ -35,11 +30,12 @@ pub(in crate::diagnose) fn curve(model: &Model) -> Option<Curve> {
         .view((d - count, d - count), (count, count))
         .into_owned();
     let (_, a, b) = variable;
-    let (low, high) = (a + UNSEEN * (b - a), b - UNSEEN * (b - a));
-    let values: Vec<f64> = (0..POINTS)
-        .map(|i| low + (high - low) * i as f64 / (POINTS - 1) as f64)
+    let unseen = TERM.unseen() * (b - a);
+    let (low, high, points) = (a + unseen, b - unseen, THRESHOLDS.function_points);
+    let values: Vec<f64> = (0..points)
+        .map(|i| low + (high - low) * i as f64 / (points - 1) as f64)
         .collect();
-    let mut phi = DMatrix::zeros(POINTS, count);
+    let mut phi = DMatrix::zeros(points, count);
     for (i, value) in values.iter().enumerate() {
         for (k, value) in basis(*value, variable, count).into_iter().enumerate() {
             phi[(i, k)] = value;
@@ -78,6 +74,6 @@ pub(in crate::diagnose) fn missing_functions(
                 values: curve.values,
             })
         })
-        .take(TOLD)
+        .take(THRESHOLDS.functions_told)
         .collect()
 }

@@ -50,13 +50,10 @@ pub(in crate::diagnose) enum Reach {
     FreeRun,
 }
 
-/// Largest floor of a free run that has a share, over the variance of y: beyond, noise alone drives a right twin away.
-const FOLLOWS: f64 = 0.5;
-
 impl Reach {
     /// Tells whether a share can be measured at this reach, the floor being so large.
     fn can_measure(self, floor: f64) -> bool {
-        self != Self::FreeRun || floor < FOLLOWS
+        self != Self::FreeRun || floor < THRESHOLDS.follows
     }
 }
 
