@@ -259,16 +259,12 @@ impl<O: Objective> ArgminSolver<&O, SearchState> for Solver<'_> {
         self.damping = (0.1 * self.damping).max(self.least_damping);
         let arrived = cost - there < enough;
         let ends = arrived || state.get_iter() + 1 >= state.get_max_iters();
+        let ended = |state: SearchState| match arrived {
+            true => state.terminate_with(CONVERGED),
+            false => state,
+        };
         if ends && !self.models_end {
-            let state = put(state, next, None).cost(there);
-            return Ok((
-                if arrived {
-                    state.terminate_with(CONVERGED)
-                } else {
-                    state
-                },
-                None,
-            ));
+            return Ok((ended(put(state, next, None).cost(there)), None));
         }
         let model = problem.problem("models", |o| {
             Ok(tolerated::<O, _>(o.model(&next, Some(trial)))?)
@@ -277,15 +273,7 @@ impl<O: Objective> ArgminSolver<&O, SearchState> for Solver<'_> {
             let reason = TerminationReason::SolverExit("no derivatives at the next point".into());
             return Ok((state.terminate_with(reason), None));
         };
-        let state = put(state, next, Some(model));
-        Ok((
-            if arrived {
-                state.terminate_with(CONVERGED)
-            } else {
-                state
-            },
-            None,
-        ))
+        Ok((ended(put(state, next, Some(model))), None))
     }
 }
 
