@@ -320,15 +320,9 @@ impl Reader<'_> {
         if let [Some(low), Some(high)] = known
             && let Err(error) = Interval::new(low, high)
         {
-            return self
-                .source(entry)
-                .error(value.span().start, error.to_string());
+            return entry.source.error(value.span().start, error.to_string());
         }
         Ok(ids)
-    }
-
-    fn source<'s>(&self, entry: &TableEntry<'_, 's>) -> SourceText<'s> {
-        entry.source
     }
 
     fn output(&mut self, entry: &TableEntry<'_, '_>) -> Result<(Id, NoiseValue), EquationsError> {
@@ -383,13 +377,11 @@ fn tapes(graph: &Graph, states: &[StateText], outputs: &[(Id, NoiseValue)]) -> T
 /// Limits that are numbers; those that are not are felt beside them.
 fn limits(graph: &Graph, states: &[StateText]) -> Vec<Interval> {
     let of = |state: &StateText| {
-        let ends = state.limits.map(|id| graph.constant(id));
-        match ends {
-            [Some(low), Some(high)] => Interval::unchecked(low, high),
-            [Some(low), None] => Interval::unchecked(low, f64::INFINITY),
-            [None, Some(high)] => Interval::unchecked(f64::NEG_INFINITY, high),
-            [None, None] => Interval::EVERYTHING,
-        }
+        let [low, high] = state.limits.map(|id| graph.constant(id));
+        Interval::unchecked(
+            low.unwrap_or(f64::NEG_INFINITY),
+            high.unwrap_or(f64::INFINITY),
+        )
     };
     states.iter().map(of).collect()
 }

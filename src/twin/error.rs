@@ -28,16 +28,6 @@ pub enum TwinError {
         /// Names of the parameters.
         names: String,
     },
-    /// A value outside the physical bounds, or not a number.
-    #[error("{name} = {} is outside its bounds {bounds}; choose a value inside", number(*value))]
-    OutOfBounds {
-        /// Parameter.
-        name: String,
-        /// The value.
-        value: f64,
-        /// Its bounds.
-        bounds: String,
-    },
     /// A name that no parameter has.
     #[error("no parameter is called {name}{}; there are {names}", did_you_mean(name, names.split(", ")))]
     Unknown {
