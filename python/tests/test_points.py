@@ -97,3 +97,17 @@ def test_an_effect_inside_is_named():
     diagnosis = tank_twin(samples=120).diagnose(leaky.simulate({"k": 0.4}), quick=True)
     assert diagnosis.verdict == "structural-gap"
     assert any(effect.target == "h" for effect in diagnosis.effects), diagnosis.effects
+
+
+def test_a_point_that_diverges_takes_no_other_along():
+    def fragile(t, x, u, theta):
+        if (x > 2.0).any():
+            raise truetwin.Diverged
+        return u - theta * x
+
+    model = tank_twin(drift=fragile)._model
+    table = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.5, 0.5, 0.5], [1.0, 3.0, 2.0]])
+    line = b'{"request": "drift", "id": 7, "points": 3, "bytes": 96}'
+    answer = model.answer(line, lambda count: table.tobytes())
+    values = np.frombuffer(answer.partition(b"\n")[2], "<f8")
+    np.testing.assert_array_equal(values, [0.5, np.nan, 0.0])

@@ -39,6 +39,8 @@ fn check_options(options: &External) -> Result<(), Failure> {
         "--timeout: needs a program; add --program 'COMMAND', or remove it"
     } else if !options.variables.is_empty() && !fmu {
         "--variables: needs an FMU; add --fmu M.fmu, or remove it"
+    } else if options.co_simulation && !fmu {
+        "--co-simulation: needs an FMU; add --fmu M.fmu, or remove it"
     } else {
         return Ok(());
     };
@@ -80,6 +82,7 @@ fn fmu(options: &External, path: &Path) -> Result<Study, Failure> {
     let settings = FmuSettings {
         variables: options.variables.clone(),
         workers: options.workers,
+        co_simulation: options.co_simulation,
     };
     let twin = FmuTwin::open(path, settings).map_err(Failure::user)?;
     twin.into_study().map_err(Failure::user)

@@ -172,7 +172,11 @@ impl Call<'_> {
             ranks,
             command,
         };
-        (arguments.command.verb().run(&context))
-            .map_err(|failure| failure.of_study(context.study_file.as_deref()))
+        let run = || arguments.command.verb().run(&context);
+        let result = match &external {
+            Some(external) => external.study().twin().side_by_side(run),
+            None => run(),
+        };
+        result.map_err(|failure| failure.of_study(context.study_file.as_deref()))
     }
 }

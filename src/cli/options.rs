@@ -21,6 +21,9 @@ pub(super) struct External {
     /// Parameters, inputs and outputs to use from the FMU; if no variable of a kind is named, all of that kind are used.
     #[arg(long, global = true, value_name = "NAME,..", value_delimiter = ',')]
     pub variables: Vec<String>,
+    /// Take the co-simulation of an FMU that offers its equations as well: it then is a black box.
+    #[arg(long, global = true)]
+    pub co_simulation: bool,
     /// Number of copies of the program or FMU that run at once [default: one per thread].
     #[arg(long, global = true, value_name = "N")]
     pub workers: Option<usize>,

@@ -46,6 +46,16 @@ pub fn diagnose(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Diagnosis, StudyError> {
+    (study.twin()).side_by_side(|| whole(study, records, validation, settings, progress))
+}
+
+fn whole(
+    study: &Study,
+    records: &[Record],
+    validation: Option<&Record>,
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+) -> Result<Diagnosis, StudyError> {
     let clock = Instant::now();
     let study = &*study.for_records(records)?;
     check(study, records, validation, settings)?;

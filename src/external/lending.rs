@@ -45,6 +45,11 @@ impl<T> Lending<T> {
         }
     }
 
+    /// Number of things, at most.
+    pub fn most(&self) -> usize {
+        self.most
+    }
+
     /// Waits until there is room. An idle thing that is `usable`, else `None`: make one. Asked for a `fresh` one, it is always
     /// to be made, and an idle one makes room where there is none.
     pub fn take(

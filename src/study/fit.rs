@@ -53,7 +53,7 @@ impl Study {
         settings: &FitSettings,
         progress: &Progress,
     ) -> Result<Fit, StudyError> {
-        self.fit_asking(true, records, settings, progress)
+        (self.twin).side_by_side(|| self.fit_asking(true, records, settings, progress))
     }
 
     /// As [`fit_with`](Self::fit_with); without asking, noise levels stay as they depend on the states in the twin, and nothing is profiled.
@@ -138,7 +138,7 @@ impl Study {
 
     /// Returns whether the records say how inputs move between samples: the study's file does not.
     pub(crate) fn asks_hold(&self) -> bool {
-        self.file.record.hold.is_none()
+        self.file.record.hold.or(self.hold).is_none()
     }
 
     /// The twin with other substeps and another rule for inputs; `None` for a black box.

@@ -6,6 +6,7 @@ mod fit;
 mod input_plan;
 mod manifest;
 mod noise_table;
+mod own_runs;
 mod plan;
 mod suitability;
 mod tables;
@@ -69,6 +70,10 @@ pub struct Study {
     trusts_starts: bool,
     /// Noise and starts as the twin's equations declare them, where these are a text.
     declared: Declared,
+    /// Hold of all inputs between samples, as the file of the twin's equations says.
+    hold: Option<Hold>,
+    /// A simulator of the same system, where the twin has one beside its equations.
+    own_runs: Option<Arc<dyn DigitalTwin>>,
 }
 
 debug_by_name!(Study);
@@ -111,6 +116,7 @@ impl Study {
         let equations = file.equations_of_twin()?;
         let mut study = Self::named(&file.twin, equations.clone(), None)?;
         study.declared = equations.declared().clone();
+        study.hold = file.record.hold;
         study.configure(file)
     }
 
@@ -121,6 +127,7 @@ impl Study {
     ) -> Result<Self, StudyError> {
         let mut study = Self::named(&file.twin, twin, None)?;
         study.declared = file.equations_of_twin()?.declared().clone();
+        study.hold = file.record.hold;
         // The text is not the twin: nobody is to read it as that.
         study.configure(&StudyFile {
             equations: None,
@@ -156,6 +163,8 @@ impl Study {
             catalogue: Catalogue::default(),
             trusts_starts: false,
             declared: Declared::default(),
+            hold: None,
+            own_runs: None,
         })
     }
 
@@ -169,6 +178,13 @@ impl Study {
     #[must_use]
     pub fn with_effects(mut self, kinds: impl IntoIterator<Item = EffectKind>) -> Self {
         self.catalogue = kinds.into_iter().fold(self.catalogue, Catalogue::with);
+        self
+    }
+
+    /// With a simulator of the same system, which `check` compares with the equations.
+    #[must_use]
+    pub(crate) fn with_own_runs(mut self, own: Arc<dyn DigitalTwin>) -> Self {
+        self.own_runs = Some(own);
         self
     }
 
@@ -342,6 +358,7 @@ impl Study {
             tolerance,
             ..
         } = *record;
+        let hold = hold.or(self.hold);
         let given = [
             (substeps.is_some(), "substeps"),
             (integrator.is_some(), "integrator"),
@@ -548,6 +565,24 @@ mod tests {
         let message = refused(&format!("[prior]\nk9 = [0.0, 1.0]\n{effect}"));
         for name in ["k9", "k1, k2, k3, k4", "sensor-lag@sensor.tau"] {
             assert!(message.contains(name), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_hold_of_the_twins_own_file_stays_under_another_study() {
+        let text = "[twin]\nname = 'tank'\n[parameters]\nk = { prior = [0.2, 1.0] }\n\
+            [states]\nh = { rate = 'u - k*h', start = 1.0 }\n[inputs]\nu = {}\n\
+            [outputs]\ny = { value = 'h', noise = 0.02 }\n[record]\nhold = 'linear'\n";
+        let parse = |text: &str| StudyFile::parse(text, "s.toml".as_ref()).unwrap();
+        let file = parse(text);
+        let served = Study::of_file_with(&file, file.own_equations().unwrap().clone());
+        for study in [Study::of_file(&file).unwrap(), served.unwrap()] {
+            for (record, hold) in [("", Hold::Linear), ("[record]\nhold = 'zero'", Hold::Zero)] {
+                let other = format!("twin = 'tank'\n[prior]\nk = [0.3, 0.9]\n{record}");
+                let configured = study.configure(&parse(&other)).unwrap();
+                assert_eq!(configured.twin().integration().unwrap().1.hold, hold);
+                assert!(!configured.asks_hold(), "nothing is asked that is said");
+            }
         }
     }
 

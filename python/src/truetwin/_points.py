@@ -77,19 +77,38 @@ class PointModel:
         points = request["points"]
         table = np.frombuffer(read(request["bytes"]), "<f8").reshape(-1, points)
         inputs, parameters = len(self.inputs), self._parameters
-        u, theta, x = table[1 : 1 + inputs], table[1 + inputs : 1 + inputs + parameters], table[1 + inputs + parameters :]
+        rows = [1 + inputs, 1 + inputs + parameters]
+
+        def values_at(table: Array) -> Array:
+            u, theta, x = table[1 : rows[0]], table[rows[0] : rows[1]], table[rows[1] :]
+            return _checked(_title(function), function(table[0], x, u, theta), names, table.shape[1])
+
         try:
             # Beyond the finite numbers, the program tries other parameters.
             with np.errstate(all="ignore"):
-                values = _checked(_title(function), function(table[0], x, u, theta), names, points)
-        except (Diverged, OverflowError, FloatingPointError):
-            values = np.full((len(names), points), np.nan)
+                try:
+                    values = values_at(table)
+                except _BEYOND:
+                    # Points of several searches stand side by side: one that diverges takes no other along.
+                    values = np.hstack([_or_nan(values_at, table[:, [point]], len(names)) for point in range(points)])
         except BaseException as error:  # SystemExit in a thread would leave the program without an answer.
             if self.failure is None:
                 self.failure = error
             return f'{{"id":{request["id"]},"error":{json.dumps(_located(error, function))}}}\n'.encode()
         numbers = values.astype("<f8", order="C", copy=False).tobytes()
         return f'{{"id":{request["id"]},"bytes":{len(numbers)}}}\n'.encode() + numbers
+
+
+#: What a function raises where its numbers are not finite.
+_BEYOND = (Diverged, OverflowError, FloatingPointError)
+
+
+def _or_nan(values_at: Callable[[Array], Array], point: Array, count: int) -> Array:
+    """Return the values at one point; not a number where it has none."""
+    try:
+        return values_at(point)
+    except _BEYOND:
+        return np.full((count, 1), np.nan)
 
 
 def _title(function: Equation) -> str:

@@ -51,6 +51,9 @@ impl Verb for Check {
         if passes(&findings) {
             findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
         }
+        if passes(&findings) {
+            findings.extend(study.check_own_runs(&drive, context.seed));
+        }
         let passed = passes(&findings);
         let json = json!({
             "schema": "truetwin.check/1", "twin": study.name(), "passed": passed, "findings": findings,

@@ -22,8 +22,8 @@ pub(super) enum Archive {
     Three(Fmi3Import),
 }
 
-/// Unpacks an FMU into a temporary folder and reads its description.
-pub(super) fn open(path: &Path) -> Result<(ModelDescription, TempDir), StudyError> {
+/// Unpacks an FMU into a temporary folder and reads its description, that of its own steps where `stepped` asks for them.
+pub(super) fn open(path: &Path, stepped: bool) -> Result<(ModelDescription, TempDir), StudyError> {
     let at = |problem: String| refused(path, format!("no usable FMU: {problem}; export it again"));
     let file = File::open(path).map_err(|error| refused(path, with_remedy(&error)))?;
     let folder = tempfile::Builder::new().prefix("truetwin-fmu-").tempdir();
@@ -37,7 +37,7 @@ pub(super) fn open(path: &Path) -> Result<(ModelDescription, TempDir), StudyErro
         std::io::ErrorKind::NotFound => at("it holds no modelDescription.xml".into()),
         _ => at(format!("modelDescription.xml: {error}")),
     })?;
-    let description = ModelDescription::parse(&text(bytes)).map_err(|problem| {
+    let description = ModelDescription::parse(&text(bytes), stepped).map_err(|problem| {
         let problem = format!("modelDescription.xml: {problem}");
         at(problem)
     })?;
@@ -83,6 +83,16 @@ impl Archive {
             Version::Two => Self::Two(Fmi2Import::new(folder, &text)?),
             Version::Three => Self::Three(Fmi3Import::new(folder, &text)?),
         })
+    }
+
+    /// Returns whether the library can be told that a step is complete.
+    pub fn hears_of_steps(&self, identifier: &str) -> bool {
+        match self {
+            Self::Two(import) => (import.binding(identifier))
+                .is_ok_and(|library| library.fmi2CompletedIntegratorStep.is_ok()),
+            Self::Three(import) => (import.binding(identifier))
+                .is_ok_and(|library| library.fmi3CompletedIntegratorStep.is_ok()),
+        }
     }
 
     /// A function of the standard that the library lacks, if there is one.

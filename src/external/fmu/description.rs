@@ -36,6 +36,8 @@ pub(super) struct ModelDescription {
     pub identifier: String,
     /// No more than one instance may exist.
     pub alone: bool,
+    /// Equations are to be told of each step that is complete.
+    pub told_of_steps: bool,
     pub parameters: Vec<FmuVariable>,
     pub inputs: Vec<FmuVariable>,
     pub outputs: Vec<FmuVariable>,
@@ -53,11 +55,30 @@ fn only_once(interface: Node<'_, '_>) -> bool {
     once.is_some_and(|text| ["true", "1"].contains(&text))
 }
 
-/// The equations where they can be run: they have states, and each thread may have instances.
+/// Returns whether `completedIntegratorStep` is to be called: unless the model says that it needs none.
+fn told_of_steps(interface: Node<'_, '_>, version: Version) -> bool {
+    let (key, unneeded) = match version {
+        Version::Two => ("completedIntegratorStepNotNeeded", ["true", "1"]),
+        Version::Three => ("needsCompletedIntegratorStep", ["false", "0"]),
+    };
+    let told = interface.attribute(key);
+    interface.has_tag_name("ModelExchange") && !told.is_some_and(|text| unneeded.contains(&text))
+}
+
+/// The equations where they can be run: they have states, and each thread may have instances; `stepped` where only its own steps are wanted.
 fn chosen<'a, 'i>(
     root: Node<'a, 'i>,
     states: &Result<Vec<FmuVariable>, String>,
+    stepped: bool,
 ) -> Result<(Interface, Node<'a, 'i>), String> {
+    if stepped {
+        return match child(root, "CoSimulation") {
+            Some(node) => Ok((Interface::CoSimulation, node)),
+            None => Err(
+                "it offers no co-simulation; export it for that, or use its model exchange".into(),
+            ),
+        };
+    }
     let problem = match (child(root, "ModelExchange"), states) {
         (Some(_), Err(problem)) => problem.as_str(),
         (Some(_), Ok(states)) if states.is_empty() => "its model exchange has no continuous states",
@@ -72,12 +93,12 @@ fn chosen<'a, 'i>(
 }
 
 impl ModelDescription {
-    /// From the file's text; the error says what is missing.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        Self::read(text).map_err(|problem| message(&problem))
+    /// From the file's text, of its own steps where `stepped` asks for them; the error says what is missing.
+    pub fn parse(text: &str, stepped: bool) -> Result<Self, String> {
+        Self::read(text, stepped).map_err(|problem| message(&problem))
     }
 
-    fn read(text: &str) -> Result<Self, String> {
+    fn read(text: &str, stepped: bool) -> Result<Self, String> {
         let document = Document::parse(text).map_err(|error| error.to_string())?;
         let root = document.root_element();
         if !root.has_tag_name("fmiModelDescription") {
@@ -93,7 +114,7 @@ impl ModelDescription {
         };
         let types = declared(root, version)?;
         let states = structure::states(root, version, &types);
-        let (interface, simulation) = chosen(root, &states)?;
+        let (interface, simulation) = chosen(root, &states, stepped)?;
         // What only equations need is no fault of others.
         let (states, indicators) = match interface {
             Interface::ModelExchange => (states?, structure::indicators(root, version)?),
@@ -109,6 +130,7 @@ impl ModelDescription {
             token: attribute(root, token)?.into(),
             identifier: attribute(simulation, "modelIdentifier")?.into(),
             alone: only_once(simulation),
+            told_of_steps: told_of_steps(simulation, version),
             parameters: Vec::new(),
             inputs: Vec::new(),
             outputs: Vec::new(),

@@ -30,7 +30,7 @@ fn signals(found: &ModelDescription) -> Signals {
 
 #[test]
 fn the_second_version_is_read() {
-    let found = ModelDescription::parse(TWO).unwrap();
+    let found = ModelDescription::parse(TWO, false).unwrap();
     assert_eq!((found.version, found.alone), (Version::Two, true));
     let names = |list: &[FmuVariable]| list.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&found.parameters), ["m"]);
@@ -55,7 +55,7 @@ fn the_third_version_is_read_and_arrays_are_left_alone() {
             <Float64 name="c" valueReference="2" causality="parameter" start="0"/>
             <Float64 name="A" valueReference="3" causality="parameter" start="1 2"><Dimension start="2"/></Float64>
             <Float64 name="y" valueReference="4" causality="output"/></ModelVariables></fmiModelDescription>"#;
-    let mut found = ModelDescription::parse(text).unwrap();
+    let mut found = ModelDescription::parse(text, false).unwrap();
     let parameters: Vec<_> = found
         .parameters
         .iter()
@@ -106,7 +106,7 @@ fn what_cannot_be_used_is_named() {
         ),
         ("</fmiModelDescription>", "", "line"),
     ] {
-        let message = ModelDescription::parse(&TWO.replace(from, to)).unwrap_err();
+        let message = ModelDescription::parse(&TWO.replace(from, to), false).unwrap_err();
         assert!(message.contains(part) || part == "line", "{message}");
     }
 }
@@ -131,7 +131,7 @@ fn states_are_those_that_the_structure_lists() {
         <EventIndicator valueReference="3"/><EventIndicator valueReference="4"/><EventIndicator valueReference="5"/></ModelStructure>
         </fmiModelDescription>"#;
     for text in [two, three] {
-        let found = ModelDescription::parse(text).unwrap();
+        let found = ModelDescription::parse(text, false).unwrap();
         assert_eq!(found.interface, Interface::ModelExchange);
         assert_eq!((found.identifier.as_str(), found.indicators), ("m", 3));
         let [v, x] = &found.states[..] else {
@@ -144,6 +144,14 @@ fn states_are_those_that_the_structure_lists() {
             ("way", "m", Some(0.0))
         );
     }
+    // Its own steps may be asked for, where it has them.
+    let stepped = ModelDescription::parse(two, true).unwrap();
+    assert_eq!(
+        (stepped.interface, stepped.identifier.as_str()),
+        (Interface::CoSimulation, "c")
+    );
+    let message = ModelDescription::parse(three, true).unwrap_err();
+    assert!(message.contains("no co-simulation"), "{message}");
     // Equations that cannot be run give way to steps.
     for (from, to) in [
         ("<Unknown index=\"5\"/>", "<Unknown index=\"2\"/>"),
@@ -152,7 +160,7 @@ fn states_are_those_that_the_structure_lists() {
             "<ModelExchange canBeInstantiatedOnlyOncePerProcess=\"true\" ",
         ),
     ] {
-        let found = ModelDescription::parse(&two.replace(from, to)).unwrap();
+        let found = ModelDescription::parse(&two.replace(from, to), false).unwrap();
         assert_eq!(
             (found.interface, found.indicators),
             (Interface::CoSimulation, 0)
@@ -162,7 +170,7 @@ fn states_are_those_that_the_structure_lists() {
         "<ContinuousStateDerivative valueReference=\"9\"/>",
         "<ContinuousStateDerivative valueReference=\"70\"/>",
     );
-    let message = ModelDescription::parse(&alone).unwrap_err();
+    let message = ModelDescription::parse(&alone, false).unwrap_err();
     assert!(
         message.contains("valueReference=\"70\"") && message.contains("for co-simulation"),
         "{message}"

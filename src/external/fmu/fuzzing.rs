@@ -6,7 +6,7 @@ use crate::record::Signals;
 
 /// Reads a text as a `modelDescription.xml`.
 pub fn description(text: &str) -> Result<(), String> {
-    let found = ModelDescription::parse(text)?;
+    let found = ModelDescription::parse(text, false)?;
     let parameters: Vec<_> = found
         .parameters
         .iter()

@@ -33,6 +33,7 @@ use variable::FmuVariable;
 /// | field | default | |
 /// |---|---|---|
 /// | `variables` | all | names of the parameters to estimate, of inputs and outputs; if no variable of a kind is named, all of that kind are used |
+/// | `co_simulation` | `false` | its own steps, as a black box, even of an FMU that offers its equations as well |
 /// | `workers` | one per thread | number of instances of co-simulation that run at once; 1 if the FMU allows no more |
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FmuSettings {
@@ -40,6 +41,8 @@ pub struct FmuSettings {
     pub variables: Vec<String>,
     /// Number of instances that run at once; `None`: one per thread of the rayon pool that opens the twin.
     pub workers: Option<usize>,
+    /// Takes the co-simulation of an FMU that offers its equations as well.
+    pub co_simulation: bool,
 }
 
 /// An FMU without noise of its own: its equations, of one for model exchange that has states; a black box, of one for co-simulation alone.
@@ -85,7 +88,7 @@ impl FmuTwin {
     ///
     /// A file that is no FMU, or not for this platform; variables that it does not have.
     pub fn open(path: &Path, settings: FmuSettings) -> Result<Self, StudyError> {
-        let (mut description, folder) = archive::open(path)?;
+        let (mut description, folder) = archive::open(path, settings.co_simulation)?;
         let variables = |problem: String| refused(path, problem);
         description.select(&settings.variables).map_err(variables)?;
         for list in [

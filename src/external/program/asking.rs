@@ -17,6 +17,14 @@ pub(super) struct Asker {
     requests: AtomicU64,
 }
 
+/// Why there is no answer.
+pub(super) enum Unanswered {
+    /// Nothing will be answered any more.
+    Broken(SimulationError),
+    /// Each copy that was asked ended or was late.
+    Gone(String),
+}
+
 /// The first line of an answer.
 pub(super) enum Reply<T> {
     /// An answer, and the number of bytes behind the line.
@@ -53,6 +61,31 @@ impl Asker {
         request: &ProgramRequest,
         read: impl Fn(&str) -> Result<Reply<T>, String>,
     ) -> Result<(T, Vec<u8>), SimulationError> {
+        self.ask_up_to(self.attempts(), request, read)
+            .map_err(|problem| self.lost(theta, problem))
+    }
+
+    /// Number of copies that are asked, one after the other.
+    pub fn attempts(&self) -> usize {
+        self.retries + 1
+    }
+
+    /// Counts a run at θ as failed; returns what that costs.
+    pub fn lost(&self, theta: &[f64], problem: Unanswered) -> SimulationError {
+        match problem {
+            Unanswered::Broken(error) => error,
+            Unanswered::Gone(problem) => self.health.failed(theta, problem),
+        }
+    }
+
+    /// As [`ask`](Self::ask), so many times at most; a run that is lost is not yet counted as failed.
+    pub fn ask_up_to<T>(
+        &self,
+        attempts: usize,
+        request: &ProgramRequest,
+        read: impl Fn(&str) -> Result<Reply<T>, String>,
+    ) -> Result<(T, Vec<u8>), Unanswered> {
+        let broken = |problem| Unanswered::Broken(self.health.broken(problem));
         let read = |line: &str| {
             read(line).map(|reply| match reply {
                 Reply::Good(answer, bytes) => (Ok(answer), bytes),
@@ -66,19 +99,18 @@ impl Asker {
             match (self.pool).ask(request, fresh, &self.description, read) {
                 Ok((Ok(answer), bytes)) => return Ok((answer, bytes)),
                 Ok((Err(text), _)) => {
-                    return Err(self.health.broken(self.named(&format!("says: {text}"))));
+                    return Err(broken(self.named(&format!("says: {text}"))));
                 }
-                Err(Trouble::Nonsense(problem)) => {
-                    return Err(self.health.broken(self.named(&problem)));
+                Err(Trouble::Nonsense(problem)) => return Err(broken(self.named(&problem))),
+                Err(Trouble::Gone(_)) if attempt < attempts => {
+                    self.health.check().map_err(Unanswered::Broken)?;
                 }
-                Err(Trouble::Gone(_)) if attempt <= self.retries => self.health.check()?,
                 Err(Trouble::Gone(problem)) => {
                     let tried = match attempt {
                         1 => String::new(),
                         _ => format!(" (attempt {attempt})"),
                     };
-                    let problem = self.named(&format!("{problem}{tried}"));
-                    return Err(self.health.failed(theta, problem));
+                    return Err(Unanswered::Gone(self.named(&format!("{problem}{tried}"))));
                 }
             }
         }

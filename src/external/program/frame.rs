@@ -61,20 +61,45 @@ impl PointTable {
         [1, inputs, parameters, states].map(|count| all.by_ref().take(count).collect())
     }
 
-    /// The request for what `method` computes at these points.
-    pub fn request(&self, id: u64, method: ServedMethod) -> Vec<u8> {
-        let (name, points) = (method.name(), self.points);
-        let bytes = self.numbers.len() * size_of::<f64>();
-        let line = format!(
-            "{{\"request\":\"{name}\",\"id\":{id},\"points\":{points},\"bytes\":{bytes}}}\n"
-        );
-        let mut request = Vec::with_capacity(line.len() + bytes);
-        request.extend_from_slice(line.as_bytes());
-        for number in &self.numbers {
-            request.extend_from_slice(&number.to_le_bytes());
-        }
-        request
+    /// Numbers of a point.
+    fn rows(&self) -> usize {
+        1 + self.sizes.iter().sum::<usize>()
     }
+}
+
+/// Returns the request for what `method` computes at the points of tables of one twin, one table beside the other.
+pub(super) fn request(id: u64, method: ServedMethod, tables: &[&PointTable]) -> Vec<u8> {
+    let name = method.name();
+    let points: usize = tables.iter().map(|table| table.points).sum();
+    let rows = tables.first().map_or(0, |table| table.rows());
+    let bytes = rows * points * size_of::<f64>();
+    let line =
+        format!("{{\"request\":\"{name}\",\"id\":{id},\"points\":{points},\"bytes\":{bytes}}}\n");
+    let mut request = Vec::with_capacity(line.len() + bytes);
+    request.extend_from_slice(line.as_bytes());
+    for row in 0..rows {
+        for table in tables {
+            for number in &table.numbers[row * table.points..(row + 1) * table.points] {
+                request.extend_from_slice(&number.to_le_bytes());
+            }
+        }
+    }
+    request
+}
+
+/// Returns the numbers of each table from the rows of an answer to [`request`].
+pub(super) fn parted(numbers: &[f64], tables: &[&PointTable]) -> Vec<Vec<f64>> {
+    let points: usize = tables.iter().map(|table| table.points).sum();
+    let mut first = 0;
+    (tables.iter())
+        .map(|table| {
+            let own = first..first + table.points;
+            first = own.end;
+            let rows = numbers.chunks_exact(points.max(1));
+            rows.flat_map(|row| row[own.clone()].iter().copied())
+                .collect()
+        })
+        .collect()
 }
 
 #[derive(Deserialize)]
@@ -131,7 +156,7 @@ mod tests {
             let now = Now::new(t, 0.1, &u, &theta);
             table.put(point, &now, |state| 10.0 * point as f64 + state as f64);
         }
-        let request = table.request(4, ServedMethod::Drift);
+        let request = request(4, ServedMethod::Drift, &[&table]);
         let end = request.iter().position(|b| *b == b'\n').unwrap() + 1;
         let line = std::str::from_utf8(&request[..end]).unwrap();
         let expected = "{\"request\":\"drift\",\"id\":4,\"points\":2,\"bytes\":96}\n";
@@ -148,6 +173,25 @@ mod tests {
         let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&numbers(&request[end..])), bits(rows.as_flattened()));
         assert_eq!(table.point(1)[3], [10.0, 11.0]);
+    }
+
+    #[test]
+    fn tables_side_by_side_are_parted_again() {
+        let of = |values: &[f64]| {
+            let now = Now::new(0.0, 0.1, &[], &[]);
+            let mut table = PointTable::new(values.len(), &now, 1);
+            for (point, value) in values.iter().enumerate() {
+                table.put(point, &now, |_| *value);
+            }
+            table
+        };
+        let (one, two) = (of(&[1.0, 2.0]), of(&[3.0]));
+        let request = request(1, ServedMethod::Drift, &[&one, &two]);
+        let end = request.iter().position(|b| *b == b'\n').unwrap() + 1;
+        let sent = numbers(&request[end..]);
+        assert_eq!(sent, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
+        let parted = parted(&sent, &[&one, &two]);
+        assert_eq!(parted, [vec![0.0, 0.0, 1.0, 2.0], vec![0.0, 3.0]]);
     }
 
     #[test]

@@ -23,6 +23,8 @@ const KEYS: [&str; 8] = [
 ];
 /// Key of the list of methods.
 const SERVES: &str = "serves";
+/// The one that says that the program simulates, too, as one without an inside does.
+const SIMULATES: &str = "simulate";
 
 /// A method of the equations that the program computes for blocks of points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,11 +70,13 @@ pub(super) struct Inside {
     pub equations: Equations,
     /// Methods that the program computes; none of a twin that is text.
     pub serves: Vec<ServedMethod>,
+    /// The program answers `simulate`, too.
+    pub simulates: bool,
 }
 
 impl PartialEq for Inside {
     fn eq(&self, other: &Self) -> bool {
-        self.serves == other.serves
+        (&self.serves, self.simulates) == (&other.serves, other.simulates)
             && self.equations.text() == other.equations.text()
             && self.file.record == other.file.record
     }
@@ -125,7 +129,7 @@ impl Inside {
             return Err("missing key `name`; give the twin one".into());
         };
         name::check(name).map_err(|problem| format!("name: {problem}"))?;
-        let serves = serves(told.get(SERVES))?;
+        let (serves, simulates) = serves(told.get(SERVES))?;
         let mut writer = TableWriter::default();
         writer.line("name".into(), &format!("[twin]\nname = {}", quoted(name)));
         writer.places.push("name".into());
@@ -155,6 +159,7 @@ impl Inside {
             file,
             equations,
             serves,
+            simulates,
         })
     }
 }
@@ -171,22 +176,26 @@ pub(super) fn check_files(record: &RecordTable) -> Result<(), String> {
     }
 }
 
-/// Reads the methods that a program serves.
-fn serves(value: Option<&Value>) -> Result<Vec<ServedMethod>, String> {
+/// Reads the methods that a program serves, and whether it simulates.
+fn serves(value: Option<&Value>) -> Result<(Vec<ServedMethod>, bool), String> {
     let names = match value {
-        None => return Ok(vec![]),
+        None => return Ok((vec![], false)),
         Some(Value::Array(names)) => names.clone(),
         Some(name) => vec![name.clone()],
     };
-    let mut methods = vec![];
+    let (mut methods, mut simulates) = (vec![], false);
     for name in &names {
+        if !simulates && name.as_str() == Some(SIMULATES) {
+            simulates = true;
+            continue;
+        }
         let method =
             (ServedMethod::ALL.into_iter()).find(|method| name.as_str() == Some(method.name()));
         match method {
             Some(method) if !methods.contains(&method) => methods.push(method),
             _ => {
                 return Err(format!(
-                    "serves: {}; give drift or next, observe, or both as a list, each once",
+                    "serves: {}; give drift or next, observe, simulate, or several as a list, each once",
                     excerpt(&name.to_string())
                 ));
             }
@@ -194,7 +203,7 @@ fn serves(value: Option<&Value>) -> Result<Vec<ServedMethod>, String> {
     }
     match methods.contains(&ServedMethod::Drift) && methods.contains(&ServedMethod::Next) {
         true => Err("serves: drift and next; states have rates or next values, not both".into()),
-        false => Ok(methods),
+        false => Ok((methods, simulates)),
     }
 }
 
@@ -362,6 +371,13 @@ mod tests {
         let inside = parse(&served).unwrap();
         assert_eq!(inside.serves, [ServedMethod::Drift]);
         assert_eq!(inside.equations.signals().outputs[0].name, "y");
+        assert!(!inside.simulates);
+        let simulating = served.replace("\"drift\"", "[\"drift\", \"simulate\"]");
+        let inside = parse(&simulating).unwrap();
+        assert_eq!(
+            (&inside.serves[..], inside.simulates),
+            (&[ServedMethod::Drift][..], true)
+        );
         let both = served.replace("\"drift\"", "[\"next\", \"observe\"]");
         let problem = parse(&both).unwrap_err();
         assert!(

@@ -28,6 +28,7 @@ mod pool;
 mod protocol;
 mod running;
 mod served;
+mod shared;
 mod worker;
 
 use super::check_call;
@@ -188,8 +189,16 @@ impl ProgramTwin {
     pub fn into_study(self) -> Result<Study, StudyError> {
         let asker = self.asker.clone();
         match (&asker.description.inside, self.plan()) {
-            (Some(inside), _) if inside.serves.is_empty() => Study::of_file(&inside.file),
-            (Some(inside), _) => Study::of_file_with(&inside.file, self),
+            (Some(inside), _) => {
+                let study = match inside.serves.is_empty() {
+                    true => Study::of_file(&inside.file)?,
+                    false => Study::of_file_with(&inside.file, self)?,
+                };
+                Ok(match inside.simulates {
+                    true => study.with_own_runs(Arc::new(ProgramRuns(asker.clone()))),
+                    false => study,
+                })
+            }
             (None, Some(plan)) => {
                 let (name, plan) = (self.name().to_owned(), plan.clone());
                 Study::new(&name, self, plan)
@@ -198,14 +207,35 @@ impl ProgramTwin {
         }
     }
 
-    /// One run of a black box.
-    fn answer(
+    /// The equations, if the program shows them.
+    fn shown(&self) -> Option<Composed> {
+        let inside = self.asker.description.inside.as_ref()?;
+        Some(match &self.served {
+            Some(served) => served.composed(inside),
+            None => inside.equations.composed(),
+        })
+    }
+}
+
+/// Runs of the program, as a black box.
+struct ProgramRuns(Arc<Asker>);
+
+impl DigitalTwin for ProgramRuns {
+    fn parameters(&self) -> ParameterSpace {
+        self.0.description.parameters.clone()
+    }
+
+    fn signals(&self) -> Signals {
+        self.0.description.signals.clone()
+    }
+
+    fn simulate(
         &self,
         theta: &[f64],
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let (asker, description) = (&self.asker, &self.asker.description);
+        let (asker, description) = (&self.0, &self.0.description);
         asker.health.check()?;
         check_call(&description.parameters, &description.signals, theta, drive)?;
         let signals = &description.signals;
@@ -229,15 +259,6 @@ impl ProgramTwin {
         asker.health.worked();
         outputs.map_err(|at| SimulationError::Diverged { at })
     }
-
-    /// The equations, if the program shows them.
-    fn shown(&self) -> Option<Composed> {
-        let inside = self.asker.description.inside.as_ref()?;
-        Some(match &self.served {
-            Some(served) => served.composed(inside),
-            None => inside.equations.composed(),
-        })
-    }
 }
 
 impl DigitalTwin for ProgramTwin {
@@ -257,7 +278,7 @@ impl DigitalTwin for ProgramTwin {
     ) -> Result<Signal, SimulationError> {
         match self.shown() {
             Some(equations) => equations.run(theta, drive, noise),
-            None => self.answer(theta, drive, noise),
+            None => ProgramRuns(self.asker.clone()).simulate(theta, drive, noise),
         }
     }
 

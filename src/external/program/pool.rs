@@ -39,6 +39,11 @@ impl Pool {
         &self.command
     }
 
+    /// Number of workers, at most.
+    pub fn most(&self) -> usize {
+        self.workers.most()
+    }
+
     /// Takes in a worker that was started elsewhere.
     pub fn adopt(&self, worker: Worker) {
         self.workers.adopt(worker);

@@ -1,28 +1,35 @@
 //! Equations whose rates or outputs a program computes, for all points of a call in one exchange.
 
 use super::asking::Asker;
-use super::frame::{self, LONGEST_LINE, PointTable};
+use super::frame::PointTable;
 use super::inside::{Inside, ServedMethod};
-use super::pool::ProgramRequest;
+use super::shared::{Exchanges, PointsAsked};
 use crate::equations::Program;
 use crate::math::Lanes;
 use crate::setting::number;
 use crate::twin::{
     Blocks, Composed, Integrator, Interval, Now, Outline, SimulationError, StateSpace, Stepping,
 };
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Passes that are under way at once, so that their points share exchanges: a thread that waits for each. An exchange costs some 0.1 ms
+/// whatever it carries, and a pass some 5 µs of it to be woken: half as many passes nearly double the cost of each, twice as many save a
+/// tenth where so many are asked for at once.
+const BESIDE: usize = 64;
 
 /// Equations of a program: a text but for what the program serves.
 pub(super) struct ServedEquations {
     asker: Arc<Asker>,
+    exchanges: Exchanges,
     /// Starts, noise, limits, and what is not served.
     text: Arc<Program>,
     /// Served rates, or next states.
     motion: Option<ServedMethod>,
     serves_outputs: bool,
     sizes: Sizes,
-    /// Why the last run that failed did, with its θ.
-    fault: Mutex<Option<(Vec<f64>, SimulationError)>>,
+    /// Why the last runs that failed did, with their θ.
+    faults: Mutex<VecDeque<(Vec<f64>, SimulationError)>>,
 }
 
 /// Numbers of states and outputs.
@@ -38,6 +45,7 @@ impl ServedEquations {
         let text = inside.equations.program();
         let outline = text.outline();
         Self {
+            exchanges: Exchanges::new(asker.clone()),
             asker,
             text,
             motion: (inside.serves.iter().copied()).find(|method| *method != ServedMethod::Observe),
@@ -46,22 +54,27 @@ impl ServedEquations {
                 states: outline.states.len(),
                 outputs: outline.outputs.len(),
             },
-            fault: Mutex::new(None),
+            faults: Mutex::default(),
         }
     }
 
     /// Returns them as twins are held.
     pub fn composed(self: &Arc<Self>, inside: &Inside) -> Composed {
-        inside.equations.composed_of(self.clone())
+        inside
+            .equations
+            .composed_of(self.clone())
+            .asked_beside(BESIDE)
     }
 
     /// Asks for what a method computes at points: rows of numbers, one a point; `None` where the program gives none.
-    fn ask(&self, method: ServedMethod, now: &Now<'_>, table: &PointTable) -> Option<Vec<f64>> {
+    fn ask(&self, method: ServedMethod, now: &Now<'_>, table: PointTable) -> Option<Vec<f64>> {
         match self.answer(method, now, table) {
             Ok(numbers) => Some(numbers),
             Err(error) => {
-                let mut fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
-                *fault = Some((now.theta.to_vec(), error));
+                let mut faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+                // Of as many passes as are under way, twice over.
+                faults.truncate(2 * BESIDE);
+                faults.push_front((now.theta.to_vec(), error));
                 None
             }
         }
@@ -71,23 +84,22 @@ impl ServedEquations {
         &self,
         method: ServedMethod,
         now: &Now<'_>,
-        table: &PointTable,
+        table: PointTable,
     ) -> Result<Vec<f64>, SimulationError> {
         let asker = &self.asker;
         asker.health.check()?;
-        let id = asker.next_id();
-        let request = ProgramRequest {
-            bytes: table.request(id, method),
-            longest: LONGEST_LINE,
-        };
-        let rows = match method {
-            ServedMethod::Observe => self.sizes.outputs,
-            ServedMethod::Drift | ServedMethod::Next => self.sizes.states,
-        };
         let points = table.points();
-        let read = |line: &str| frame::reply(line, id, (rows, points));
-        let ((), bytes) = asker.ask(now.theta, &request, read)?;
-        let numbers = frame::numbers(&bytes);
+        let question = Arc::new(PointsAsked {
+            method,
+            rows: match method {
+                ServedMethod::Observe => self.sizes.outputs,
+                ServedMethod::Drift | ServedMethod::Next => self.sizes.states,
+            },
+            table,
+            theta: now.theta.to_vec(),
+        });
+        let numbers = self.exchanges.ask(&question)?;
+        let table = &question.table;
         // The first point is the centre: others may be where no state ever is.
         let first = numbers.iter().step_by(points);
         let Some(row) = first.clone().position(|value| !value.is_finite()) else {
@@ -212,7 +224,7 @@ impl Blocks for ServedEquations {
         let Some(method) = self.motion else {
             return Blocks::drift(&*self.text, now, stride, x, dx);
         };
-        let rows = self.ask(method, now, &self.table(now, stride, x));
+        let rows = self.ask(method, now, self.table(now, stride, x));
         set(rows.as_deref(), self.sizes.states, stride, dx);
     }
 
@@ -220,7 +232,7 @@ impl Blocks for ServedEquations {
         if !self.serves_outputs {
             return Blocks::observe(&*self.text, now, stride, x, y);
         }
-        let rows = self.ask(ServedMethod::Observe, now, &self.table(now, stride, x));
+        let rows = self.ask(ServedMethod::Observe, now, self.table(now, stride, x));
         set(rows.as_deref(), self.sizes.outputs, self.sizes.outputs, y);
     }
 
@@ -228,13 +240,13 @@ impl Blocks for ServedEquations {
         let Some(method) = self.motion else {
             return self.text.step_lanes(now, x);
         };
-        let (n, table) = (self.sizes.states, self.table_of_lanes(now, x));
-        let rows = self.ask(method, &now[0], &table);
-        let points = x.len() / n;
+        let n = self.sizes.states;
+        let rows = self.ask(method, &now[0], self.table_of_lanes(now, x));
+        let (points, passes) = (x.len() / n, now.len());
         for (lane, now) in now.iter().enumerate() {
             for (point, x) in x.chunks_exact_mut(n).enumerate() {
                 for (state, x) in x.iter_mut().enumerate() {
-                    let at = state * table.points() + lane * points + point;
+                    let at = (state * passes + lane) * points + point;
                     let value = rows.as_ref().map_or(f64::NAN, |rows| rows[at]);
                     let x = &mut x.0[lane];
                     // As a discrete twin that is called point after point.
@@ -253,7 +265,7 @@ impl Blocks for ServedEquations {
             return self.text.observe_lanes(now, x, y);
         }
         let table = self.table_of_lanes(now, x);
-        let rows = self.ask(ServedMethod::Observe, &now[0], &table);
+        let rows = self.ask(ServedMethod::Observe, &now[0], table);
         let points = y.len();
         for lane in 0..now.len() {
             for (point, y) in y.iter_mut().enumerate() {
@@ -278,7 +290,7 @@ impl Blocks for ServedEquations {
         for (point, x) in x.chunks_exact(n).enumerate() {
             table.put(point, &now[point / points], |state| x[state]);
         }
-        let rows = self.ask(method, &now[0], &table);
+        let rows = self.ask(method, &now[0], table);
         set(rows.as_deref(), n, n, dx);
     }
 
@@ -287,9 +299,9 @@ impl Blocks for ServedEquations {
         if let Err(error) = self.asker.health.check() {
             return Some(error);
         }
-        let mut fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
-        let (_, error) = fault.take_if(|(at, _)| at == theta)?;
-        Some(error)
+        let mut faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        let own = faults.iter().position(|(at, _)| at == theta)?;
+        faults.remove(own).map(|(_, error)| error)
     }
 }
 

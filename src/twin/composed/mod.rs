@@ -96,6 +96,24 @@ impl Composed {
         Self { own, parts }
     }
 
+    /// Returns the same equations, of which a call waits for an exchange that so many passes may share.
+    pub(crate) fn asked_beside(mut self, passes: usize) -> Self {
+        self.own.beside = passes;
+        self
+    }
+
+    /// Returns the number of passes that should be under way at once.
+    pub(crate) fn beside(&self) -> usize {
+        self.own.beside
+    }
+
+    /// Returns whether passes of several θ at once are calls of one, not of one pass after the other.
+    pub(crate) fn joins_lanes(&self) -> bool {
+        self.own.joins_lanes()
+            && self.parts.acts.leave_motion()
+            && self.integrator() != Integrator::Stiff
+    }
+
     /// Returns names and units of all that is free, of states of parts, too.
     pub fn outline(&self) -> Outline {
         self.parts.outline.clone()

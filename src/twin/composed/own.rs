@@ -13,6 +13,8 @@ pub(super) struct OwnEquations {
     engine: Arc<dyn Engine>,
     /// The same equations for many points in one call.
     blocks: Option<Arc<dyn Blocks>>,
+    /// Number of passes that should be under way at once: more than one where a call waits for an exchange that passes share.
+    pub beside: usize,
 }
 
 impl Deref for OwnEquations {
@@ -28,6 +30,7 @@ impl OwnEquations {
         Self {
             engine: own,
             blocks: None,
+            beside: 1,
         }
     }
 
@@ -35,11 +38,17 @@ impl OwnEquations {
         Self {
             engine: own.clone(),
             blocks: Some(own),
+            beside: 1,
         }
     }
 
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.engine, &other.engine)
+    }
+
+    /// Returns whether the points of several filters go in one call of the rates, whatever the parameters of each.
+    pub fn joins_lanes(&self) -> bool {
+        (self.blocks.as_ref()).is_some_and(|blocks| blocks.is_joined())
     }
 
     /// Returns why the last run at this θ failed, if the equations know.

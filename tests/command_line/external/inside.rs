@@ -2,6 +2,7 @@
 
 use super::command_line::{done, refused};
 use super::{file, impatient, place, python, started};
+use rayon::prelude::*;
 use std::fs;
 use truetwin::external::program::ProgramSettings;
 use truetwin::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
@@ -158,6 +159,100 @@ fn exchanges_are_few() {
     // 60 rows; five points for two states; the centre and two neighbours for each parameter.
     assert!(count.parse::<usize>().unwrap() <= 2 * 60, "{seen}");
     assert!(points.parse::<usize>().unwrap() >= 3 * 5, "{seen}");
+}
+
+/// Log-likelihoods of a program's equations at many θ: one after the other, then all at once; and the numbers of exchanges of both.
+fn passes_of(name: &str, before: &str, lengths: &[f64]) -> [(Vec<Option<f64>>, usize); 2] {
+    let log = place().join(format!("{name}.txt"));
+    let logged = format!(
+        "open({:?}, 'a').write('x'); {before}",
+        log.display().to_string()
+    );
+    let settings = ProgramSettings {
+        workers: Some(1),
+        ..ProgramSettings::default()
+    };
+    let program = served("[\"drift\"]", "euler", &logged);
+    let twin = started(&format!("{name}.py"), &program, settings).unwrap();
+    let twin = equations(twin.into_study().unwrap().twin());
+    let record = record();
+    let filter = FilterSettings::default();
+    let pass = |l: &f64| {
+        let kalman = Kalman::new(twin.clone(), &record, &filter).unwrap();
+        kalman.log_likelihood(&[*l, 0.5]).ok()
+    };
+    let exchanges = || fs::metadata(&log).map_or(0, |data| data.len() as usize);
+    let alone: Vec<_> = lengths.iter().map(pass).collect();
+    let first = exchanges();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(lengths.len());
+    let together = (pool.build().unwrap()).install(|| lengths.par_iter().map(pass).collect());
+    [(alone, first), (together, exchanges() - first)]
+}
+
+fn lengths(count: u32) -> Vec<f64> {
+    (0..count).map(|i| 0.8 + 0.02 * f64::from(i)).collect()
+}
+
+/// Passes of many threads share exchanges, and none of their bits depends on it; where a point's answer depends on others, none is shared.
+#[test]
+fn passes_side_by_side_share_exchanges_and_change_no_bit() {
+    if python().is_none() {
+        return;
+    }
+    let [alone, together] = passes_of("shared", "pass", &lengths(32));
+    assert_eq!(alone.0, together.0);
+    assert!(5 * together.1 < alone.1, "{} of {}", together.1, alone.1);
+    let odd = "answer = array('d', [a * (1 + 1e-9 * n) for a in answer])";
+    let [alone, together] = passes_of("odd", odd, &lengths(4));
+    assert_eq!(alone.0, together.0);
+    assert!(together.1 >= alone.1, "{} of {}", together.1, alone.1);
+}
+
+/// A copy that ends takes no pass along that shared the exchange.
+#[test]
+fn an_end_in_a_shared_exchange_costs_the_pass_that_it_is_of() {
+    if python().is_none() {
+        return;
+    }
+    let [alone, together] = passes_of("long", "if max(l) > 0.94: os._exit(3)", &lengths(9));
+    assert_eq!(alone.0, together.0);
+    let worked: Vec<bool> = together.0.iter().map(Option::is_some).collect();
+    assert_eq!(worked, [vec![true; 8], vec![false]].concat());
+}
+
+/// A program that simulates otherwise than its equations say is told where.
+#[test]
+fn runs_of_a_program_are_compared_with_its_equations() {
+    let Some(python) = python() else { return };
+    let program = r#"
+import json, sys
+for line in sys.stdin:
+    request = json.loads(line)
+    if request["request"] == "describe":
+        print(json.dumps({"name": "lag", "serves": ["simulate"], "parameters": {"k": {"unit": "1/s", "prior": [0.4, 0.8]}},
+            "states": {"h": {"rate": "u - k*h", "start": 0.5}}, "inputs": {"u": {}}, "outputs": {"y": {"unit": "m", "value": "h"}},
+            "record": {"step": 0.1, "samples": 80, "integrator": "euler", "input": {"levels": [0, 1], "hold": 20}}}), flush=True)
+        continue
+    h, y = 0.5, []
+    for u in request["inputs"]["u"]:
+        y.append(h)
+        h += request["step"] * (u - FACTOR * request["theta"]["k"] * h)
+    print(json.dumps({"id": request["id"], "outputs": {"y": y}}), flush=True)
+"#;
+    for (factor, parts) in [
+        ("1.0", &["runs are those of its equations"][..]),
+        (
+            "1.2",
+            &["y differs from 0.1 s on", "simulate answers", "k = 0.6"],
+        ),
+    ] {
+        file("lag.py", &program.replace("FACTOR", factor));
+        let said = done(&["check", "--program", &format!("{python} lag.py")]);
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    }
 }
 
 #[test]

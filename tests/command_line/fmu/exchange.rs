@@ -98,6 +98,23 @@ fn what_the_fmu_refuses_costs_its_run() {
     assert_eq!(run(0.6, 1.0).unwrap(), fine);
 }
 
+/// An FMU that has outputs behind complete steps alone is told of them, unless its description says that it needs not be.
+#[test]
+fn complete_steps_are_told_where_the_fmu_needs_it() {
+    let told = |name: &str, tag: &str| {
+        let text = TANKS.replace("<ModelExchange ", &format!("<ModelExchange {tag} "));
+        let path = fmu(name, "tanks2.c", &text, &["-DTOLD"])?;
+        let twin = Twin::new(open(&path));
+        Some(twin.simulate(&[0.6, 0.6, 0.55, 1.0], &drive(), Noise::OFF))
+    };
+    let Some(path) = tanks() else { return };
+    let plain = Twin::new(open(&path)).simulate(&[0.6, 0.6, 0.55, 1.0], &drive(), Noise::OFF);
+    let needs = told("told", "").unwrap();
+    assert_eq!(needs.unwrap(), plain.unwrap());
+    let not = told("untold", "completedIntegratorStepNotNeeded=\"true\"").unwrap();
+    assert!(not.is_err(), "it is not told what it says it does not need");
+}
+
 /// Heights of the ball in closed form.
 fn heights(e: f64, kick: f64, times: impl Iterator<Item = f64>) -> Vec<f64> {
     const G: f64 = 9.81;

@@ -155,7 +155,22 @@ impl ExchangeBench {
         y: &mut [f64],
     ) -> Outcome<()> {
         self.place(model, at)?;
+        // Outputs are those behind a step of the record.
+        self.complete_step(model, at)?;
         self.instance.get(&model.references.outputs, y)
+    }
+
+    /// Tells the FMU, where it needs to know, that a step ends here. What it changes then holds for this evaluation alone.
+    fn complete_step(&mut self, model: &ExchangeModel, at: EvaluatedAt<'_>) -> Outcome<()> {
+        if !model.told_of_steps {
+            return Ok(());
+        }
+        if self.instance.complete_step()? {
+            self.distrust();
+            self.instance.event()?;
+            self.instance.set_states(at.x)?;
+        }
+        Ok(())
     }
 
     /// An event indicator, relations being as at the start: its zero is where they change.
@@ -226,6 +241,7 @@ impl ExchangeBench {
             };
             // Relations are settled there, so that this event alone is one.
             self.place(model, before)?;
+            self.complete_step(model, before)?;
             let FmuEvent::Indicator(index, up) = cause else {
                 break;
             };

@@ -109,6 +109,20 @@ impl ExchangeInstance {
         Ok(())
     }
 
+    /// Tells the FMU that a step is complete; returns whether it asks for an event here. No state of it was saved that is returned to.
+    pub fn complete_step(&mut self) -> Result<bool, SimulationError> {
+        let (mut event, mut end) = (false, false);
+        each!(self, "a complete step", it => {
+            FmiModelExchange::completed_integrator_step(it.as_mut(), true, &mut event, &mut end)
+        })?;
+        match end {
+            true => Err(SimulationError::Failed(
+                "the FMU asks to end the simulation".into(),
+            )),
+            false => Ok(event),
+        }
+    }
+
     /// Lets the FMU treat an event here; returns the time of the next one that it foresees.
     pub fn event(&mut self) -> Result<Option<f64>, SimulationError> {
         each!(self, "an event", it => FmiModelExchange::enter_event_mode(it.as_mut()))?;

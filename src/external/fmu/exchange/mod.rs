@@ -20,6 +20,8 @@ struct ExchangeModel {
     references: References,
     states: usize,
     indicators: usize,
+    /// It is told of each step that is complete.
+    told_of_steps: bool,
     /// Time of the initialisation, which is 0 on a record's clock.
     start: f64,
     /// `true` after a fatal error: no function may be called any more.
@@ -40,6 +42,8 @@ impl ExchangeTwin {
     /// With a first instance, initialised at its own start values.
     pub fn new(description: &ModelDescription, archive: Archive) -> Result<Self, String> {
         let references = |list: &[FmuVariable]| list.iter().map(|v| v.reference).collect();
+        let told_of_steps =
+            description.told_of_steps && archive.hears_of_steps(&description.identifier);
         let model = Arc::new(ExchangeModel {
             archive,
             references: References {
@@ -49,6 +53,7 @@ impl ExchangeTwin {
             },
             states: description.states.len(),
             indicators: description.indicators,
+            told_of_steps,
             start: description.start,
             is_corrupt: AtomicBool::new(false),
         });

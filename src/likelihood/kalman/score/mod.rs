@@ -9,6 +9,7 @@ use super::{Coordinates, FilterError, Kalman};
 use crate::math::{LANES, Stencil};
 use beside::{Together, together};
 use nalgebra::{DMatrix, DMatrixView, DVector};
+use rayon::prelude::*;
 pub(crate) use response::Responses;
 
 /// Gradient of the log-likelihood in the [`Coordinates`] φ, by central differences (one-sided at a bound); d parameters, N samples.
@@ -137,8 +138,7 @@ impl Score {
         let rows = |theta: &[f64]| rows(kalman, &order, theta);
         let (log_likelihood, centre) = rows(theta)?;
         let phi = coordinates.of(theta);
-        let mut jacobian = DMatrix::zeros(centre.len(), phi.len());
-        for j in coordinates.free() {
+        let slope = |j: usize| {
             let (moved, distance) = coordinates.beside(&phi, j, FORWARD);
             let (_, there) = rows(&coordinates.theta(&moved))?;
             // Times of events are told so sharply that half a step counts: the other side takes it away.
@@ -149,11 +149,18 @@ impl Score {
                 true => (&rows(&coordinates.theta(&back))?.1, distance - behind),
                 false => (&centre, distance),
             };
-            jacobian
-                .column_mut(j)
-                .zip_zip_apply(&there, other, |d, there, other| {
-                    *d = (there - other) / way;
-                });
+            Ok((there - other) / way)
+        };
+        let free = coordinates.free();
+        // Passes that wait for exchanges wait together.
+        let slopes: Result<Vec<DVector<f64>>, FilterError> = match kalman.twin.beside() {
+            1 => free.iter().map(|j| slope(*j)).collect(),
+            _ => free.par_iter().map(|j| slope(*j)).collect(),
+        };
+        let slopes = slopes?;
+        let mut jacobian = DMatrix::zeros(centre.len(), phi.len());
+        for (&j, slope) in free.iter().zip(&slopes) {
+            jacobian.set_column(j, slope);
         }
         Self::assemble(kalman, log_likelihood, &centre, &jacobian)
     }
@@ -238,18 +245,32 @@ fn side_by_side(
     let all: Vec<(&Kalman<'_>, &[f64])> = (kalmans.iter())
         .flat_map(|kalman| thetas.iter().map(move |theta| (kalman, *theta)))
         .collect();
-    let runs: Vec<Option<Together>> = all.chunks(LANES).map(together).collect();
+    let lanes = lanes_of(kalmans);
+    let runs: Vec<Option<Together>> = match kalmans.first().map_or(1, |kalman| kalman.twin.beside())
+    {
+        1 => all.chunks(lanes).map(together).collect(),
+        _ => all.par_chunks(lanes).map(together).collect(),
+    };
     (0..kalmans.len())
         .map(|r| {
             let each: Option<Vec<(&Together, usize)>> = (r * thetas.len()..(r + 1) * thetas.len())
                 .map(|job| {
-                    let run = runs[job / LANES].as_ref()?;
-                    Some((run, run.lane(job % LANES)?))
+                    let run = runs[job / lanes].as_ref()?;
+                    Some((run, run.lane(job % lanes)?))
                 })
                 .collect();
             Some(of_lanes(&each?, &moves, phi.len()))
         })
         .collect()
+}
+
+/// Number of passes that go in lanes of one: where each waits for exchanges that passes share, and lanes would ask one after the other, one.
+fn lanes_of(kalmans: &[Kalman<'_>]) -> usize {
+    match kalmans {
+        [one] if one.twin.beside() > 1 && one.twin.joins_lanes() => LANES,
+        [one, ..] if one.twin.beside() > 1 => 1,
+        _ => LANES,
+    }
 }
 
 /// A point beside θ.

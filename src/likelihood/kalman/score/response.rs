@@ -18,6 +18,7 @@ use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman};
 use crate::record::Signal;
 use crate::twin::{Acting, Composed, Entry, Now, Role};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Step of a difference, as a share of what a state or a parameter varies.
 const STEP: f64 = 1e-4;
@@ -154,26 +155,33 @@ impl Kalman<'_> {
         };
         let mut outputs = Signal::zeros((samples, self.channels));
         let mut inputs = Signal::zeros((samples, acting.at(0).u.len()));
-        let mut covariance = linear.start();
-        let mut rows = Vec::with_capacity(samples);
-        for k in 0..samples {
+        let row = |k: usize| {
             let now = acting.at(k);
             let mean = means.row(k).to_vec();
             let mut y = vec![0.0; self.channels];
             self.twin.observe(&now, &mean, &mut y);
+            let is_there = |j: usize| {
+                let sample = k + late.get(j).copied().unwrap_or(0);
+                sample < samples && !self.record.outputs()[[sample, j]].is_nan()
+            };
+            let c = linear.outputs(&now, &mean, is_there);
+            (y, c, linear.step(&now, &mean), linear.noise(&now, &mean))
+        };
+        // Rows that wait for exchanges wait together.
+        let linearised: Vec<_> = match self.twin.beside() {
+            1 => (0..samples).map(row).collect(),
+            _ => (0..samples).into_par_iter().map(row).collect(),
+        };
+        let mut covariance = linear.start();
+        let mut rows = Vec::with_capacity(samples);
+        for (k, (y, c, step, (q, r))) in linearised.into_iter().enumerate() {
+            let now = acting.at(k);
             for (j, y) in y.iter().enumerate() {
                 outputs[[k, j]] = *y;
             }
             for (i, u) in now.u.iter().enumerate() {
                 inputs[[k, i]] = *u;
             }
-            let is_there = |j: usize| {
-                let sample = k + late.get(j).copied().unwrap_or(0);
-                sample < samples && !self.record.outputs()[[sample, j]].is_nan()
-            };
-            let c = linear.outputs(&now, &mean, is_there);
-            let step = linear.step(&now, &mean);
-            let (q, r) = linear.noise(&now, &mean);
             let gain = gain(&covariance, &c, &r);
             covariance = carried(&covariance, (&c, &gain), &step.matrix(), &q);
             rows.push(ResponseRow {
