@@ -16,3 +16,4 @@ mod security;
 mod stop;
 #[path = "../common/timeless.rs"]
 mod timeless;
+mod versions;
