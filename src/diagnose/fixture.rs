@@ -33,6 +33,17 @@ pub(crate) fn biased_record(study: &Study, bias: f64, seed: u64) -> Record {
     record(study, &twin, &theta, seed)
 }
 
+/// Settings with these effects of the library alone.
+pub(crate) fn only(study: &Study, ids: &[&str]) -> DiagnoseSettings {
+    DiagnoseSettings {
+        without: (study.effects().iter().map(|e| e.id()))
+            .filter(|id| !ids.contains(id))
+            .map(Into::into)
+            .collect(),
+        ..DiagnoseSettings::default()
+    }
+}
+
 /// Listed effects as hypotheses beside the fitted twin of a study.
 pub(crate) fn listed_terms(study: &Study, records: &[Record]) -> Vec<Arc<Term>> {
     let settings = DiagnoseSettings::default();

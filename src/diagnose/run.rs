@@ -163,7 +163,7 @@ const MOST_SIMULATIONS: usize = 100_000;
 mod tests {
     use super::*;
     use crate::diagnose::Verdict;
-    use crate::diagnose::fixture::{biased_record, tanks};
+    use crate::diagnose::fixture::{biased_record, only, tanks};
     use crate::progress::Listener;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
@@ -217,12 +217,12 @@ mod tests {
 
     #[test]
     fn a_cancelled_search_gives_what_was_found() {
-        let study = tanks(150);
+        let study = tanks(100);
         let records = [biased_record(&study, 2.0, 5)];
         let found = |give_partial| {
             let settings = DiagnoseSettings {
                 give_partial,
-                ..DiagnoseSettings::default()
+                ..only(&study, &["linear-loss", "sensor-bias", "sensor-gain"])
             };
             let progress = Impatient::progress("explain", 3);
             diagnose(&study, &records, None, &settings, &progress)
@@ -240,7 +240,7 @@ mod tests {
         let study = tanks(4096);
         let settings = DiagnoseSettings {
             quick: true,
-            ..DiagnoseSettings::default()
+            ..only(&study, &["sensor-bias", "sensor-gain"])
         };
         let record = biased_record(&study, 2.0, 5);
         let biased = diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap();

@@ -127,20 +127,20 @@ impl Default for DiagnoseSettings {
 mod tests {
     use super::*;
     use crate::diagnose::diagnose;
-    use crate::diagnose::fixture::{biased_record, tanks};
+    use crate::diagnose::fixture::{biased_record, only, tanks};
     use crate::progress::Progress;
 
     /// Each part has its say in the evidence for a gap.
     #[test]
     fn every_part_that_is_taken_out_changes_what_is_said() {
-        let study = tanks(150);
+        let study = tanks(60);
         let records = [biased_record(&study, 2.0, 5)];
         let said = |ablated: Vec<Ablation>| {
             let settings = DiagnoseSettings {
                 detection_only: true,
                 quick: true,
                 ablated,
-                ..DiagnoseSettings::default()
+                ..only(&study, &["sensor-bias", "sensor-gain"])
             };
             let found = diagnose(&study, &records, None, &settings, &Progress::silent());
             found.unwrap().detection.log_evidence

@@ -177,13 +177,13 @@ fn two_processes_fill_one_folder() {
     let at = place.path();
     crate::stop::short(at);
     for (words, part) in [
-        ("bank --twin van-der-pol --size 6000", ""),
+        ("bank --twin van-der-pol --size 3000", ""),
         (
-            "withheld --study short.toml --trials 4 --kinds none,outside --detection-only",
+            "withheld --study short.toml --trials 2 --kinds none,outside --detection-only",
             "keys",
         ),
         (
-            "reproduce --twin van-der-pol --runs 6 --bank-size 500 --epochs 3",
+            "reproduce --twin van-der-pol --runs 3 --bank-size 300 --epochs 2",
             "estimator.est",
         ),
     ] {

@@ -100,11 +100,9 @@ fn in_distribution_most_records_keep_the_estimate_of_a_trusted_prior() {
     }
 }
 
-/// Of the twin's own records the gate keeps as many as it says, also where the noise that the network has learnt is three times that of the
-/// records: its null errs as the network does.
-#[test]
-fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
-    const RECORDS: u64 = 20;
+/// Of so many of the twin's own records, those that the gate keeps where the noise is the declared one, and where the noise that the network
+/// has learnt is three times that of the records: the null errs as the network does.
+fn kept_by_the_gate(records: u64) -> [u64; 2] {
     // The prior is trusted, and what is kept is not refined.
     let text = "twin = 'van-der-pol'\n[noise]\nx2 = 0.0212\n[prior]\ntrust = true";
     let file = StudyFile::parse(text, "s.toml".as_ref()).unwrap();
@@ -125,19 +123,30 @@ fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
                 estimator.estimate_with(&record(nu, 400 + seed), &options, &Progress::silent());
             !found.unwrap().gate.out_of_distribution
         };
-        (0..RECORDS).filter(of).count() as u64
+        (0..records).filter(of).count() as u64
     };
-    // Fewer than 13 of 20 have a chance of 1 in 2400 at 90 %. With all of the null at the network's estimate 23 of 60 were kept, and at that
-    // rate 13 of 20 have a chance of 1 in 70.
-    let kept = [kept(estimator()), kept(&loud)];
-    assert!(kept.iter().all(|kept| *kept >= 13), "{kept:?} of {RECORDS}");
+    [kept(estimator()), kept(&loud)]
 }
 
-/// Four records of one ν, one of them half as long, one of half the step: errors shrink, 90 % intervals hold ν, and the records agree. Two
-/// of another ν do not.
-/// Weights without the precisions, or simulations shared by records, fail the bounds.
+/// Of 8, fewer than 5 have a chance of 1 in 200 at 90 %. With all of the null at the network's estimate 23 of 60 were kept: at that rate both
+/// times 5 of 8 have a chance of 1 in 45.
 #[test]
-fn records_of_one_system_are_weighed_together() {
+fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
+    let kept = kept_by_the_gate(8);
+    assert!(kept.iter().all(|kept| *kept >= 5), "{kept:?} of 8");
+}
+
+/// Of 20, fewer than 13 have a chance of 1 in 2400 at 90 %, and 13 a chance of 1 in 70 at the rate of 23 in 60.
+#[test]
+#[ignore = "minutes; run it in release"]
+fn the_gate_keeps_many_records_of_the_twin_whatever_noise_is_declared() {
+    let kept = kept_by_the_gate(20);
+    assert!(kept.iter().all(|kept| *kept >= 13), "{kept:?} of 20");
+}
+
+/// Four records of one ν, one of them half as long, one of half the step, so many times: errors shrink, 90 % intervals hold ν, and the records
+/// agree. Two of another ν do not. `most` bounds the mean square of the errors.
+fn weighed_together(trials: u64, most: f64) {
     let options = EstimateOptions {
         step_of_record: true,
         ..EstimateOptions::default()
@@ -146,8 +155,7 @@ fn records_of_one_system_are_weighed_together() {
         (estimator().estimate_together(records, &options, &Progress::silent())).unwrap()
     };
     let (mut held, mut agreed, mut square) = (0, 0, 0.0);
-    const TRIALS: u64 = 4;
-    for i in 0..TRIALS {
+    for i in 0..trials {
         let mut records: Vec<Record> = (0..4).map(|r| record(3.0, 100 + 4 * i + r)).collect();
         records[2] = stepped(3.0, 100 + 4 * i + 2, 0.025);
         let drive = Drive::autonomous(0.05, 150).unwrap();
@@ -161,28 +169,41 @@ fn records_of_one_system_are_weighed_together() {
         assert!(found.std_error[0] < least.fold(f64::INFINITY, f64::min));
         held += u64::from((found.low[0]..=found.high[0]).contains(&3.0));
         agreed += u64::from(found.p_value > 0.05);
-        square += ((found.theta[0] - 3.0) / found.std_error[0]).powi(2) / TRIALS as f64;
+        square += ((found.theta[0] - 3.0) / found.std_error[0]).powi(2) / trials as f64;
     }
     assert!(
-        crate::binomial_bounds(TRIALS, 0.9, 0.99).contains(&held),
+        crate::binomial_bounds(trials, 0.9, 0.99).contains(&held),
         "{held}"
     );
     assert!(
-        crate::binomial_bounds(TRIALS, 0.95, 0.99).contains(&agreed),
+        crate::binomial_bounds(trials, 0.95, 0.99).contains(&agreed),
         "{agreed}"
     );
-    // χ² of four, over four, is below 3.3 in 99 of 100 cases.
-    assert!(square < 3.3, "{square}");
+    assert!(square < most, "{square}");
     let changed = all(&[record(3.0, 1), record(3.1, 2)]);
     assert!(changed.p_value < 0.01, "{}", changed.p_value);
 }
 
+/// χ² of two, over two, is below 4.6 in 99 of 100 cases. Errors stated at a third of their size fail with a probability of 0.6; weights that
+/// do not tell another ν fail.
+#[test]
+fn records_of_one_system_are_weighed_together() {
+    weighed_together(2, 4.6);
+}
+
+/// χ² of twelve, over twelve, is below 2.18 in 99 of 100 cases. Weights without the precisions, or simulations shared by records, fail.
+#[test]
+#[ignore = "a minute; run it in release"]
+fn many_records_of_one_system_are_weighed_together() {
+    weighed_together(12, 2.18);
+}
+
 /// Without trust in the prior the answer is the record's own: with one parameter alone outside its prior, 90 % intervals hold the truth
-/// in the records that the gate does not reject, too. With the network's answers kept, k1 is missed in most. Of five, fewer than 3 have a
-/// chance of 1 in 116.
+/// in the records that the gate does not reject, too. With the network's answers kept, k1 is missed in most. Of four, fewer than 3 have a
+/// chance of 1 in 19; a version that holds every other one fails with a probability of 0.69.
 #[test]
 fn kept_answers_hold_outside_the_prior() {
-    let (own, trusting) = hold_outside_the_prior(5);
+    let (own, trusting) = hold_outside_the_prior(4);
     assert!(own >= 3 && trusting <= 2);
 }
 
@@ -247,7 +268,7 @@ fn threads_change_no_bit() {
                 ..PretrainOptions::default()
             };
             let (estimator, _) = pretrain(&studies()[1], &options, &Progress::silent()).unwrap();
-            let drive = Drive::new(0.5, Array2::from_elem((400, 1), 1.0)).unwrap();
+            let drive = Drive::new(0.5, Array2::from_elem((150, 1), 1.0)).unwrap();
             let twin = estimator.study().twin();
             let outputs = twin.simulate(&[1.0, 1.0, 0.8, 1.0], &drive, Noise::new(3, "t", 0));
             let record = Record::new(drive, outputs.unwrap()).unwrap();

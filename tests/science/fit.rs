@@ -31,47 +31,42 @@ fn value(fit: &Fit, name: &str) -> f64 {
     found.unwrap_or_else(|| panic!("{name}")).value
 }
 
-/// So do those at a corner of the prior: intervals of the posterior hold 34 of 48 values there.
-#[test]
-fn intervals_cover_where_the_prior_shapes_the_posterior() {
+/// Values of so many records at a corner of the prior of which a fit states an interval, and those of which it holds the truth.
+fn held_in_a_corner(records: u64) -> (u64, u64) {
     let truth = [1.17, 0.333, 0.612, 1.35];
     let (mut held, mut all) = (0, 0);
-    for seed in 0..12 {
+    for seed in 0..records {
         let noise = Noise::new(seed, "corner", 0);
         let drive = tanks().drive(noise).unwrap();
         let outputs = CascadedTanks.simulate(&truth, &drive, noise).unwrap();
         let fit = fitted(&tanks(), &[Record::new(drive, outputs).unwrap()]);
         for (p, truth) in fit.parameters.iter().zip(truth) {
             // A search that has not arrived states none.
-            all += usize::from(p.low.is_finite());
-            held += usize::from(p.low <= truth && truth <= p.high);
+            all += u64::from(p.low.is_finite());
+            held += u64::from(p.low <= truth && truth <= p.high);
         }
     }
-    // Of 48 at 0.9, fewer than 38 are held once in a hundred times.
+    (all, held)
+}
+
+/// Of 20 values at 0.9, fewer than 14 are held once in a hundred times; intervals of the posterior, which hold 34 of 48, fail with a
+/// probability of 0.36, and intervals of half the width with 0.78.
+#[test]
+fn intervals_cover_where_the_prior_shapes_the_posterior() {
+    let (all, held) = held_in_a_corner(5);
+    assert!(all >= 16 && held + 20 >= all + 14, "{held} of {all}");
+}
+
+/// Of 48 at 0.9, fewer than 38 are held once in a hundred times; intervals of the posterior hold 34.
+#[test]
+#[ignore = "a minute; run it in release"]
+fn intervals_cover_where_the_prior_shapes_many_posteriors() {
+    let (all, held) = held_in_a_corner(12);
     assert!(all >= 40 && held + 48 >= all + 38, "{held} of {all}");
 }
 
-/// Intervals of 12 records hold the truth as often as they say; noise levels come out within a third.
-#[test]
-fn intervals_cover_and_noise_levels_are_found() {
-    let (mut held, mut all) = (0, 0);
-    for seed in 0..12 {
-        let fit = fitted(&tanks(), &[simulated(seed)]);
-        assert!(fit.convergence.converged, "{:?}", fit.convergence);
-        for (p, truth) in fit.parameters.iter().zip(TRUTH) {
-            all += 1;
-            held += usize::from((p.low..=p.high).contains(&truth));
-        }
-        let y = fit.noise.iter().find(|level| level.name == "y").unwrap();
-        assert!((y.value / 0.15).ln().abs() < 0.3, "{y:?}");
-    }
-    // 48 intervals at 0.9, four to a record: 43 ± 2.1 if independent, ± 4.2 if four alike.
-    assert!(held >= 35, "{held} of {all}");
-}
-
-/// Beside steps of five times the noise, intervals of 20 records hold the truth as often as they say, and the step itself is found.
-#[test]
-fn a_rounded_sensor_leaves_intervals_that_cover() {
+/// Beside steps of five times the noise, those of so many records whose interval holds the truth. The step itself is found.
+fn held_beside_rounding(records: u64) -> u64 {
     let parsed = |magnitudes: &str| {
         let twin =
             "twin = 'van-der-pol'\n[noise]\ny = 0.01\n[record]\nintegrator = 'runge-kutta-4'";
@@ -90,16 +85,31 @@ fn a_rounded_sensor_leaves_intervals_that_cover() {
         [Record::new(drive, outputs).unwrap()]
     };
     let mut held = 0;
-    for seed in 0..20 {
+    for seed in 0..records {
         let fit = fitted(&known, &rounded(seed));
         let nu = &fit.parameters[0];
-        held += usize::from((nu.low..=nu.high).contains(&1.3));
+        held += u64::from((nu.low..=nu.high).contains(&1.3));
     }
-    // 18 ± 1.3.
-    assert!((14..=20).contains(&held), "{held} of 20");
     let fit = fitted(&parsed(""), &rounded(0));
     let step = value(&fit, "sensor-quantization@sensor.step");
     assert!((0.03..0.06).contains(&step), "{step}");
+    held
+}
+
+/// Of 6, fewer than 4 have a chance of 1 in 63 at 0.9. Intervals of half the width, which hold 0.6, fail with a probability of 0.48; those of
+/// the noise alone, a fifth as wide, with 0.96.
+#[test]
+fn a_rounded_sensor_leaves_intervals_that_cover() {
+    let held = held_beside_rounding(6);
+    assert!(held >= 4, "{held} of 6");
+}
+
+/// 18 ± 1.3 of 20.
+#[test]
+#[ignore = "a minute; run it in release"]
+fn a_rounded_sensor_leaves_intervals_that_cover_in_many_records() {
+    let held = held_beside_rounding(20);
+    assert!(held >= 14, "{held} of 20");
 }
 
 /// The flow through k4 grows by 60 % at two thirds of the record. A step that begins beyond the record would be left off.
@@ -143,38 +153,41 @@ fn emptied(seed: u64) -> [Record; 2] {
 }
 
 /// Counts, of four parameters a record: those that move by more than their errors where cells are missing, and intervals that hold the
-/// truth then.
-fn missing_cells(seeds: std::ops::Range<u64>) -> (usize, usize) {
-    let (mut far, mut held) = (0, 0);
+/// truth without and with missing cells. Fits of whole records converge, and find the noise within a third.
+fn missing_cells(seeds: std::ops::Range<u64>) -> (usize, [usize; 2]) {
+    let (mut far, mut held) = (0, [0; 2]);
     for seed in seeds {
         let [whole, part] = emptied(seed).map(|record| fitted(&tanks(), &[record]));
+        assert!(whole.convergence.converged, "{:?}", whole.convergence);
+        let y = whole.noise.iter().find(|level| level.name == "y").unwrap();
+        assert!((y.value / 0.15).ln().abs() < 0.3, "{y:?}");
         let both = whole.parameters.iter().zip(&part.parameters);
         for ((a, b), truth) in both.zip(TRUTH) {
             far += usize::from((a.value - b.value).abs() > a.std_error.max(b.std_error));
-            held += usize::from((b.low..=b.high).contains(&truth));
+            held[0] += usize::from((a.low..=a.high).contains(&truth));
+            held[1] += usize::from((b.low..=b.high).contains(&truth));
         }
     }
-    println!("{far} moved by more than their errors, {held} intervals hold");
+    println!("{far} moved by more than their errors, {held:?} intervals hold");
     (far, held)
 }
 
-/// One cell in ten is emptied: θ moves by less than its own errors, and intervals hold the truth.
+/// One cell in ten is emptied: θ moves by less than its own errors, and intervals hold the truth as often as they say. 16 intervals at 0.9, four
+/// to a record: 14.4 ± 1.2 if independent, ± 2.4 if four alike. Intervals of half the width, which hold 9.6, fail with a probability of 0.7.
 #[test]
-fn a_tenth_of_the_cells_may_be_missing() {
-    let (far, held) = missing_cells(20..26);
-    assert!(far <= 2, "{far} of 24");
-    // 21.6 ± 1.5 if independent, ± 3 if the four of a record are alike.
-    assert!(held >= 16, "{held} of 24");
+fn intervals_cover_though_cells_are_missing() {
+    let (far, held) = missing_cells(20..24);
+    assert!(far <= 1, "{far} of 16");
+    assert!(held.iter().all(|held| *held >= 11), "{held:?} of 16");
 }
 
-/// The same on 40 records.
+/// Of 40 records: 144 ± 3.8 if independent, ± 7.6 if the four of a record are alike.
 #[test]
 #[ignore = "takes minutes"]
-fn a_tenth_of_the_cells_may_be_missing_from_many_records() {
+fn intervals_of_many_records_cover_though_cells_are_missing() {
     let (far, held) = missing_cells(100..140);
     assert!(far <= 8, "{far} of 160");
-    // 144 ± 3.8 if independent, ± 7.6 if the four of a record are alike.
-    assert!(held >= 129, "{held} of 160");
+    assert!(held.iter().all(|held| *held >= 129), "{held:?} of 160");
 }
 
 /// The same run logged at 1, 2 and 4 steps: parameters and noise per √s agree.
@@ -274,11 +287,12 @@ fn a_free_ceiling_is_found_and_nested_fits_are_never_worse() {
     );
 }
 
-/// The seed moves the evidence of a real twin by a tenth of a nat.
+/// Three seeds move the evidence of a real twin by a tenth of a nat at most. Draws whose error is 0.1 nat spread by more with a probability of
+/// 0.7, and say so themselves.
 #[test]
 fn the_seed_hardly_moves_the_evidence_of_the_tanks() {
     let records = [simulated(50)];
-    let all: Vec<f64> = (0..5)
+    let all: Vec<f64> = (0..3)
         .map(|seed| {
             let settings = FitSettings {
                 seed,

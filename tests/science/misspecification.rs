@@ -93,6 +93,11 @@ fn series(departure: Departure, strength: f64, noise: Noise) -> Vec<f64> {
     y
 }
 
+fn record(y: &[f64]) -> Record {
+    let outputs = Signal::from_shape_fn((SAMPLES, 1), |(k, _)| y[k]);
+    Record::new(Drive::autonomous(1.0, SAMPLES).unwrap(), outputs).unwrap()
+}
+
 /// Hoeffding's D of pairs without ties.
 fn hoeffding(pairs: &[(f64, f64)]) -> f64 {
     let n = pairs.len() as f64;
@@ -177,27 +182,33 @@ impl Checks {
         }
     }
 
-    /// Whether each check calls the series, at a level of 5 %. Without an input a second lag is correlated noise by another name, so that for
-    /// `diagnose` noise of another kind than the twin's counts as well.
+    /// Returns whether each check calls the series, at a level of 5 %. Without an input a second lag is correlated noise by another name, so that
+    /// for `diagnose` noise of another kind than the twin's counts as well.
     fn call(&self, y: &[f64], departure: Departure, noise: Noise) -> [bool; 4] {
-        let outputs = Signal::from_shape_fn((SAMPLES, 1), |(k, _)| y[k]);
-        let drive = Drive::autonomous(1.0, SAMPLES).unwrap();
-        let record = Record::new(drive, outputs).unwrap();
+        let [network, refit] = self.gates_call(y);
+        let authors = self.authors_call(y, departure, noise);
+        [self.diagnosis_calls(y), network, refit, authors]
+    }
+
+    fn diagnosis_calls(&self, y: &[f64]) -> bool {
         let settings = DiagnoseSettings {
             detection_only: true,
             ..DiagnoseSettings::default()
         };
-        let records = std::slice::from_ref(&record);
-        let found = diagnose(&self.study, records, None, &settings, &Progress::silent()).unwrap();
+        let records = [record(y)];
+        let found = diagnose(&self.study, &records, None, &settings, &Progress::silent()).unwrap();
+        found.verdict == Verdict::StructuralGap
+            || !(found.correlated_noise.is_empty() && found.outliers.is_empty())
+    }
+
+    /// The gate of the network's estimate, and the one after a refit.
+    fn gates_call(&self, y: &[f64]) -> [bool; 2] {
         let options = EstimateOptions::default();
-        let estimate = (self.estimator).estimate_with(&record, &options, &Progress::silent());
+        let estimate = (self.estimator).estimate_with(&record(y), &options, &Progress::silent());
         let estimate = estimate.unwrap();
         [
-            found.verdict == Verdict::StructuralGap
-                || !(found.correlated_noise.is_empty() && found.outliers.is_empty()),
             estimate.gate.p_value <= 0.05,
             estimate.after().is_some_and(|gate| gate.p_value <= 0.05),
-            self.authors_call(y, departure, noise),
         ]
     }
 
@@ -225,8 +236,7 @@ impl Checks {
     fn calls(&self, departure: Departure, strength: f64, trials: u64) -> [u64; 4] {
         let mut calls = [0; 4];
         for trial in 0..trials {
-            let noise = Noise::new(1168, &format!("{departure:?} {strength}"), trial);
-            let y = series(departure, strength, noise);
+            let (y, noise) = trial_series(departure, strength, trial);
             let called = self.call(&y, departure, noise);
             calls = array::from_fn(|i| calls[i] + u64::from(called[i]));
         }
@@ -235,15 +245,32 @@ impl Checks {
     }
 }
 
-/// A clear second lag is called by the authors' check, and by `diagnose` in half of the series: three of six have a chance of 1 in 400 at the
-/// level. Noise 18 % above the declared level is none of a gate's business: in the declared one the gates call 7 and 9 of twelve series.
+/// A series of the test's, with its noise.
+fn trial_series(departure: Departure, strength: f64, trial: u64) -> (Vec<f64>, Noise) {
+    let noise = Noise::new(1168, &format!("{departure:?} {strength}"), trial);
+    (series(departure, strength, noise), noise)
+}
+
+/// A clear second lag is called by the authors' check, and by `diagnose` in half of six series: at the level, three have a chance of 1 in 400.
+/// Noise 18 % above the declared level is none of a gate's business: gates in the declared one, which call 7 and 9 of twelve series, call
+/// at most 2 of 7 with chances of 1 in 9 and 1 in 78.
 #[test]
 fn a_second_lag_is_called_and_a_level_of_noise_is_not() {
     let checks = Checks::new();
-    let [diagnosed, .., authors] = checks.calls(Departure::Second, 0.8, 6);
+    let (mut diagnosed, mut authors) = (0, 0);
+    for trial in 0..6 {
+        let (y, noise) = trial_series(Departure::Second, 0.8, trial);
+        diagnosed += u64::from(checks.diagnosis_calls(&y));
+        authors += u64::from(checks.authors_call(&y, Departure::Second, noise));
+    }
     assert!(diagnosed >= 3 && authors >= 5, "{diagnosed} and {authors}");
-    let [_, network, refit, _] = checks.calls(Departure::Level, 0.18, 12);
-    assert!(network <= 3 && refit <= 3, "{network} and {refit}");
+    let (mut network, mut refit) = (0, 0);
+    for trial in 0..7 {
+        let called = checks.gates_call(&trial_series(Departure::Level, 0.18, trial).0);
+        network += u64::from(called[0]);
+        refit += u64::from(called[1]);
+    }
+    assert!(network <= 2 && refit <= 2, "{network} and {refit}");
 }
 
 #[test]

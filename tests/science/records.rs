@@ -357,11 +357,21 @@ fn an_offset_is_no_other_start() {
     let mut source = Noise::new(8, "records", 0).source("v");
     let offset = run.mapv(|y| y + 6.0 + 0.02 * source.normal());
     let record = Record::new(drive, offset).unwrap();
+    let study = Study::of(Plant).unwrap();
+    let rivals = [
+        "sensor-bias",
+        "sensor-gain",
+        "sensor-drift",
+        "constant-forcing",
+    ];
     let settings = DiagnoseSettings {
         quick: true,
+        without: (study.effects().iter().map(|e| e.id()))
+            .filter(|id| !rivals.contains(id))
+            .map(Into::into)
+            .collect(),
         ..DiagnoseSettings::default()
     };
-    let study = Study::of(Plant).unwrap();
     let found = diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap();
     assert_eq!(found.cause.accepted, ["sensor-bias@sensor"]);
 }

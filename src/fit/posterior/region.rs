@@ -130,7 +130,8 @@ mod tests {
         assert!((region.squared_distance(&[1.015]) - 4.0).abs() < 1e-6);
     }
 
-    /// Standardised errors of the mean have unit size: 40 records, χ² with 40 degrees of freedom within 40 ± 4·√80.
+    /// Standardised errors of the mean have unit size: 15 records, χ² with 15 degrees of freedom, which is outside once in a thousand times.
+    /// Errors of half their size fail in 17 of 20.
     #[test]
     fn the_region_is_calibrated() {
         let beliefs = Beliefs {
@@ -139,7 +140,7 @@ mod tests {
         };
         let twin = Twin::new(VanDerPol);
         let drive = Drive::autonomous(0.05, 100).unwrap();
-        let squares: f64 = (0..40)
+        let squares: f64 = (0..15)
             .map(|seed| {
                 let noise = Noise::new(seed, "region", 0);
                 let outputs = VanDerPol.simulate(&[1.5], &drive, noise).unwrap();
@@ -153,6 +154,6 @@ mod tests {
                 ((region.theta[0] - 1.5) / region.axes[(0, 0)]).powi(2)
             })
             .sum();
-        assert!((10.0..80.0).contains(&squares), "{squares}");
+        assert!((3.5..37.7).contains(&squares), "{squares}");
     }
 }

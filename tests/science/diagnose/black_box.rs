@@ -60,13 +60,13 @@ fn few(alarms: u64, records: u64) {
     assert!(alarms <= most, "{alarms} of {records}, at most {most}");
 }
 
-/// At most 1 alarm of 6: a version that accuses two of three twins fails with a probability of 0.98.
+/// At most 1 alarm of 4: a version that accuses two of three twins fails with a probability of 0.89.
 #[test]
 fn perfect_twins_in_a_box_are_rarely_accused() {
-    rarely_accused(3);
+    rarely_accused(2);
 }
 
-/// `cargo test --release --test science perfect_twins_in_a_box -- --ignored`
+/// At most 6 alarms of 200: a version that accuses one twin in fifteen fails with a probability of 0.98.
 #[test]
 #[ignore = "minutes; run it in release"]
 fn perfect_twins_in_a_box_are_rarely_accused_over_many_records() {
@@ -97,7 +97,6 @@ fn effects_of_signals_are_named() {
     named(&[("van-der-pol", "sensor-bias@sensor", "offset=0.1")]);
 }
 
-/// `cargo test --release --test science of_signals_are_named -- --ignored`
 #[test]
 #[ignore = "a minute; run it in release"]
 fn more_effects_of_signals_are_named() {
@@ -131,7 +130,6 @@ fn an_effect_inside_the_box_is_named_by_nobody() {
     named_by_nobody(&[("van-der-pol", "cubic-stiffness@x2", 8)]);
 }
 
-/// `cargo test --release --test science a_ceiling_inside -- --ignored`
 #[test]
 #[ignore = "a minute; run it in release"]
 fn a_ceiling_inside_the_box_is_named_by_nobody() {
@@ -280,21 +278,18 @@ fn starts_are_of_each_record() {
     );
 }
 
-/// A seed gives the same bits on one thread and on three.
+/// A seed gives the same bits on one thread and on three, to the end of a diagnosis: a sum in the order of the threads would differ.
 #[test]
 fn threads_change_no_bit_of_a_box() {
-    let effect = "id='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.1}";
-    let (shown, record) = affected("van-der-pol", effect, &[1.2], Noise::new(57, "threads", 0));
+    let effect = "[[effect]]\nid='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.3}\n";
+    let (study, record) = heated(effect, 0.02, Noise::new(57, "threads", 0));
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new();
         let pool = pool.num_threads(threads).build().unwrap();
-        let settings = DiagnoseSettings {
-            detection_only: true,
-            ..DiagnoseSettings::default()
-        };
+        let settings = DiagnoseSettings::default();
         let records = std::slice::from_ref(&record);
         let mut found = pool
-            .install(|| diagnose(&shown, records, None, &settings, &Progress::silent()).unwrap());
+            .install(|| diagnose(&study, records, None, &settings, &Progress::silent()).unwrap());
         found.seconds = 0.0;
         format!("{found:?}")
     };

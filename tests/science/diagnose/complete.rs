@@ -5,7 +5,8 @@ use crate::binomial_bounds;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict};
 use truetwin::twin::Noise;
 
-/// A parameter that jumps half-way: the record leaves its twin there, not before, and with the step added nothing is left.
+/// A parameter that jumps half-way: the record leaves its twin there, not before, and with the step added nothing is left. The step
+/// is first of the whole library, at its time.
 #[test]
 fn a_gap_begins_where_it_begins() {
     let study = study("tanks");
@@ -15,6 +16,10 @@ fn a_gap_begins_where_it_begins() {
     let record = record(study.twin(), text, &theta, drive(&study, noise), noise);
     let found = found(&study, record, None);
     println!("{}", line("parameter-step@k3", &found));
+    let first = &found.cause.effects[0];
+    assert_eq!(first.key(), "parameter-step@k3");
+    let (name, at) = &first.magnitudes[1];
+    assert!(name == "time" && (at - 100.0).abs() < 1.5, "{at} s");
     let maps = &found.location.maps;
     let onset = found.location.onset.as_ref().expect("no onset");
     assert!(
@@ -117,10 +122,9 @@ fn the_missing_function_is_drawn() {
     );
 }
 
-/// Effects of the size that a record of the plain twin says it would have revealed in 80 of 100 cases are revealed about so
-/// often.
-#[test]
-fn power_is_what_it_says() {
+/// Counts, of so many records of each of three effects, those in which an effect is revealed that has the size which a record of the plain
+/// twin says it would have revealed in 80 of 100 cases.
+fn revealed(each: u64) -> (u64, u64) {
     let study = study("van-der-pol");
     let theta = [1.4];
     let plain = Noise::new(44, "plain", 0);
@@ -145,7 +149,7 @@ fn power_is_what_it_says() {
         let text = format!(
             "[[effect]]\nid='{id}'\ntarget='{target}'\n{more}magnitudes={{{name}={value}}}\n"
         );
-        for i in 0..4 {
+        for i in 0..each {
             let noise = Noise::new(45, id, i);
             let drive = drive(&study, noise);
             let record = record(study.twin(), &text, &theta, drive, noise);
@@ -156,15 +160,29 @@ fn power_is_what_it_says() {
         }
         println!("{id} {name} = {value}: {seen} of {records} so far");
     }
+    (seen, records)
+}
+
+/// Of 6 records, fewer than 3 have a chance of 1 in 59 at 0.8: sizes of which one in five is revealed fail with a probability of 0.90.
+#[test]
+fn power_is_what_it_says() {
+    let (seen, records) = revealed(2);
+    assert!(seen >= 3, "{seen} of {records}");
+}
+
+/// Of 60 records. To first order, and for this θ̂: somewhat more or less than 80 %. Sizes of which half, or all, are revealed fail.
+#[test]
+#[ignore = "minutes; run it in release"]
+fn power_is_what_it_says_in_many_records() {
+    let (seen, records) = revealed(20);
     let bounds = binomial_bounds(records, 0.8, 0.999);
-    // To first order, and for this θ̂: somewhat more or less than 80 %.
     assert!(
         (bounds.start().saturating_sub(3)..=*bounds.end()).contains(&seen),
         "{seen} of {records}"
     );
 }
 
-/// Two effects at once, one in the equations and one at the sensor: both are accepted, and nothing else.
+/// Two effects at once, one in the equations and one at the sensor: both are accepted of eight, and nothing else.
 #[test]
 fn two_effects_are_both_accepted() {
     let study = study("van-der-pol");
@@ -172,7 +190,17 @@ fn two_effects_are_both_accepted() {
     let text = "[[effect]]\nid='coulomb-friction'\ntarget='x2'\nmagnitudes={force=0.2}\n\
                 [[effect]]\nid='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.15}\n";
     let record = record(study.twin(), text, &[1.4], drive(&study, noise), noise);
-    let found = found(&study, record, None);
+    let rivals = [
+        "coulomb-friction",
+        "power-law",
+        "stribeck-friction",
+        "linear-loss",
+        "constant-forcing",
+        "sensor-bias",
+        "sensor-gain",
+        "sensor-lag",
+    ];
+    let found = found_among(&study, record, &rivals);
     println!("{}", line("pair", &found));
     let mut accepted = found.cause.accepted.clone();
     accepted.sort();

@@ -22,7 +22,7 @@ use truetwin::twin::{Integrator, Noise, Twin};
 pub const FALSE_ALARMS: f64 = 0.01;
 
 /// Checks that records of the twins themselves, half of them with θ outside the prior, are rarely called a gap, and that nothing is named
-/// of the first two of each twin.
+/// of the first of each twin.
 fn rarely_accused(records: u64) {
     let verdict_alone = DiagnoseSettings {
         detection_only: true,
@@ -35,7 +35,7 @@ fn rarely_accused(records: u64) {
             let noise = Noise::new(31, name, i);
             let theta = theta(&study, i % 2 == 1, noise);
             let record = record(study.twin(), "", &theta, drive(&study, noise), noise);
-            let found = match i < 2 {
+            let found = match i < 1 {
                 true => found(&study, record, None),
                 false => with_settings(&study, record, &verdict_alone),
             };
@@ -49,31 +49,24 @@ fn rarely_accused(records: u64) {
     assert!(alarms <= most, "{alarms} of {records}, at most {most}");
 }
 
-/// At most 2 alarms: a version that accuses one perfect twin in three fails with a probability of 0.98.
+/// Of 8 records at most 1 alarm: a version that accuses every other perfect twin fails with a probability of 0.96, one in three with 0.80.
 #[test]
 fn a_perfect_twin_is_rarely_accused() {
-    rarely_accused(20);
+    rarely_accused(8);
 }
 
-/// At most 10 alarms: a version that accuses one perfect twin in twenty fails with a probability of 0.99.
-///
-/// `cargo test --release --test science a_perfect_twin -- --ignored`
+/// Of 400 records at most 10 alarms: a version that accuses one perfect twin in twenty fails with a probability of 0.99.
 #[test]
 #[ignore = "minutes; run it in release"]
 fn a_perfect_twin_is_rarely_accused_over_many_records() {
     rarely_accused(400);
 }
 
-/// Effects that a record shows clearly are detected, located, and named or among the rivals.
-#[test]
-fn clear_effects_are_found_and_named() {
+/// Effects that a record shows clearly are detected, located, and named or among the rivals of the whole library.
+fn found_and_named(keys: &[&str]) {
     let study = study("van-der-pol");
     let effects = clear("van-der-pol");
-    for key in [
-        "cubic-stiffness@x2",
-        "sensor-rectification@sensor",
-        "parameter-step@nu",
-    ] {
+    for &key in keys {
         let (_, text) = effects.iter().find(|(k, _)| *k == key).unwrap();
         let noise = Noise::new(32, key, 0);
         let text = format!("[[effect]]\n{text}\n");
@@ -93,10 +86,35 @@ fn clear_effects_are_found_and_named() {
     }
 }
 
+/// One effect: a version that looks at the wrong place or ranks the effects wrongly fails.
+#[test]
+fn a_clear_effect_is_found_and_named() {
+    found_and_named(&["sensor-rectification@sensor"]);
+}
+
+/// An effect of the sensor, of a rate and of a parameter.
+#[test]
+#[ignore = "a minute; run it in release"]
+fn clear_effects_are_found_and_named() {
+    found_and_named(&[
+        "cubic-stiffness@x2",
+        "sensor-rectification@sensor",
+        "parameter-step@nu",
+    ]);
+}
+
+/// Effects that the error of a coarse step passes for, and those of the records.
+const LIKE_A_STEP: [&str; 5] = [
+    "cubic-stiffness",
+    "linear-loss",
+    "sensor-delay",
+    "sensor-gain",
+    "sensor-lag",
+];
+
 /// Euler's error and a stiffer spring together, seen almost without noise: the spring alone is named, with a step that is no longer Euler's.
 /// Four of Euler's substeps leave an error that passes for a lag of the sensor.
-#[test]
-fn the_rest_of_a_coarse_step_is_not_named() {
+fn no_rest_is_named(seeds: u64, found: impl Fn(&Study, Record) -> Diagnosis) {
     let whole = study("van-der-pol");
     let configured = |record: &str| {
         let text = format!("twin = 'van-der-pol'\n{record}\n[noise]\ny = 0.01\n");
@@ -105,10 +123,10 @@ fn the_rest_of_a_coarse_step_is_not_named() {
     };
     let (coarse, fine) = (configured(""), configured("[record]\nsubsteps = 64"));
     let spring = "[[effect]]\nid = 'cubic-stiffness'\ntarget = 'x2'\nfrom = 'x1'\nmagnitudes = { coefficient = 0.17 }\n";
-    for seed in 0..2 {
+    for seed in 0..seeds {
         let noise = Noise::new(36, "coarse", seed);
         let record = record(fine.twin(), spring, &[1.24], drive(&coarse, noise), noise);
-        let found = found(&coarse, record, None);
+        let found = found(&coarse, record);
         println!("{}", line("cubic-stiffness@x2", &found));
         assert_eq!(found.cause.accepted, ["cubic-stiffness@x2"], "seed {seed}");
         assert_eq!(
@@ -119,7 +137,21 @@ fn the_rest_of_a_coarse_step_is_not_named() {
     }
 }
 
-/// A delay of a sensor without noise: once it is known, the step that looked fine enough is not, and its error passes for a lag.
+/// One record, few rivals: a version that keeps Euler's step names a lag as well.
+#[test]
+fn the_rest_of_a_coarse_step_is_not_named() {
+    no_rest_is_named(1, |study, record| found_among(study, record, &LIKE_A_STEP));
+}
+
+/// Two records, the whole library.
+#[test]
+#[ignore = "a minute; run it in release"]
+fn the_rest_of_a_coarse_step_is_not_named_by_the_library() {
+    no_rest_is_named(2, |study, record| found(study, record, None));
+}
+
+/// A delay of a sensor without noise: once it is known, the step that looked fine enough is not, and its error passes for a lag. A
+/// version that refines the step once names the lag.
 #[test]
 fn a_finer_step_is_asked_for_as_often_as_it_shows() {
     let study = study("van-der-pol");
@@ -130,22 +162,22 @@ fn a_finer_step_is_asked_for_as_often_as_it_shows() {
         "[[effect]]\nid = 'sensor-delay'\ntarget = 'sensor'\nmagnitudes = { delay = 0.75 }\n";
     let noise = Noise::new(37, "late", 0);
     let record = record(exact.twin(), delay, &[1.1], drive(&study, noise), noise);
-    let found = found(&study, record, None);
+    let found = found_among(&study, record, &LIKE_A_STEP);
     println!("{}", line("sensor-delay@sensor", &found));
     assert_eq!(found.cause.accepted, ["sensor-delay@sensor"]);
     let (_, delay) = found.cause.effects[0].magnitudes[0];
     assert!((delay - 0.75).abs() < 0.02, "{delay}");
 }
 
-/// The diagnosis of a record of the tanks at the centre of the prior, with an effect.
-fn found_in_tanks(key: &str, magnitudes: &str) -> Diagnosis {
+/// The diagnosis of a record of the tanks at the centre of the prior, with an effect, by these effects.
+fn found_in_tanks(key: &str, magnitudes: &str, among: &[&str]) -> Diagnosis {
     let study = study("tanks");
     let (id, target) = key.split_once('@').unwrap();
     let text = format!("[[effect]]\nid='{id}'\ntarget='{target}'\nmagnitudes={{{magnitudes}}}\n");
     let noise = Noise::new(33, key, 0);
     let theta = study.twin().parameters().centre();
     let record = record(study.twin(), &text, &theta, drive(&study, noise), noise);
-    let found = found(&study, record, None);
+    let found = found_among(&study, record, among);
     println!("{}", line(key, &found));
     found
 }
@@ -156,24 +188,35 @@ fn found_in_tanks(key: &str, magnitudes: &str) -> Diagnosis {
 fn a_rounded_sensor_is_known_by_its_values() {
     let key = "sensor-quantization@sensor";
     for step in ["0.4", "2.5"] {
-        let found = found_in_tanks(key, &format!("step={step}"));
+        let rivals = [
+            "sensor-quantization",
+            "sensor-noise",
+            "sensor-saturation",
+            "sensor-backlash",
+        ];
+        let found = found_in_tanks(key, &format!("step={step}"), &rivals);
         assert_eq!(found.verdict, Verdict::StructuralGap);
         assert_eq!(found.cause.accepted, [key], "step {step}");
         assert!(found.cause.effects[0].probability > 0.9);
     }
 }
 
-/// A parameter that jumps late in a record: the likelihood as a function of the time has a valley at each sample and a plateau before.
+/// A parameter that jumps late in a record: the likelihood as a function of the time has a valley at each sample and a plateau before, where a
+/// search from one start ends. `complete::a_gap_begins_where_it_begins` finds another among the whole library.
 #[test]
 fn a_step_is_found_at_its_time() {
-    for (i, time, size) in [(0, 119.0, "-0.5"), (2, 60.0, "0.5")] {
-        let key = "parameter-step@k3";
-        let found = found_in_tanks(key, &format!("size={size},time={time:.1}"));
-        assert_eq!(found.cause.effects[0].key(), key, "{i}");
-        let (name, at) = &found.cause.effects[0].magnitudes[1];
-        assert_eq!(name, "time");
-        assert!((at - time).abs() < 1.5, "{at} s in place of {time} s");
-    }
+    let key = "parameter-step@k3";
+    let rivals = [
+        "parameter-step",
+        "parameter-drift",
+        "linear-loss",
+        "sensor-drift",
+    ];
+    let found = found_in_tanks(key, "size=-0.5,time=119.0", &rivals);
+    assert_eq!(found.cause.effects[0].key(), key);
+    let (name, at) = &found.cause.effects[0].magnitudes[1];
+    assert_eq!(name, "time");
+    assert!((at - 119.0).abs() < 1.5, "{at} s in place of 119 s");
 }
 
 /// A sensor that reads 6 % too little, which the parameters imitate outside their prior: beside those, the gain promises nothing, and a
@@ -186,7 +229,8 @@ fn an_effect_is_found_that_drove_the_parameters_out() {
     let noise = Noise::new(38, "gain", 0);
     let theta = [0.72, 1.03, 0.484, 0.72];
     let record = record(study.twin(), gain, &theta, drive(&study, noise), noise);
-    let found = found(&study, record, None);
+    let rivals = ["sensor-gain", "sensor-bias", "sensor-lag", "state-ceiling"];
+    let found = found_among(&study, record, &rivals);
     println!("{}", line("sensor-gain@sensor", &found));
     let (best, class) = (&found.cause.effects[0], &found.cause.class);
     assert_eq!(best.target, "sensor", "{class:?}");
@@ -197,7 +241,14 @@ fn an_effect_is_found_that_drove_the_parameters_out() {
 #[test]
 fn a_long_delay_of_an_actuator_is_named() {
     let key = "actuator-delay@actuator";
-    let found = found_in_tanks(key, "delay=15.0");
+    let rivals = [
+        "actuator-delay",
+        "actuator-lag",
+        "sensor-delay",
+        "sensor-lag",
+        "parameter-drift",
+    ];
+    let found = found_in_tanks(key, "delay=15.0", &rivals);
     assert_eq!(found.cause.accepted, [key]);
     let (_, delay) = found.cause.effects[0].magnitudes[0];
     assert!((delay - 15.0).abs() < 1.0, "{delay}");
@@ -221,8 +272,10 @@ fn what_parameters_absorb_is_no_structural_gap() {
     );
 }
 
-/// A force that nobody listed is detected, and no effect is named for it.
+/// A force that nobody listed is detected, and no effect is named for it. `memory::a_response_to_the_own_cycle_is_no_wave` asks the same of
+/// another.
 #[test]
+#[ignore = "half a minute; run it in release"]
 fn an_unlisted_force_is_named_by_nobody() {
     let study = study("van-der-pol");
     let noise = Noise::new(34, "unlisted", 0);

@@ -171,46 +171,30 @@ fn calls_that_cannot_be_made_are_refused_with_the_limit() {
     assert!(error.contains("kind listed"), "{error}");
 }
 
+/// A verdict alone is that of the whole diagnosis; parts that are taken out are stated. Neither changes the trial.
 #[test]
-fn a_verdict_alone_is_the_verdict_of_the_whole() {
+fn parts_of_a_diagnosis_change_no_trial() {
     let study = oscillator();
     let place = tempfile::tempdir().unwrap();
-    let card = |detection_only, name: &str| {
+    let card = |detection_only, ablated: &[Ablation], name: &str| {
         let settings = TrialSettings {
             trials: 1,
             kinds: vec![Kind::Listed],
             detection_only,
-            ..TrialSettings::default()
-        };
-        let sealed = sealed(&study, settings, &place.path().join(name)).unwrap();
-        sealed.score(&Progress::silent()).unwrap()
-    };
-    let (whole, alone) = (card(false, "whole"), card(true, "verdicts"));
-    let outcome = |card: &Scorecard| card.rows[0].outcome().cloned().unwrap();
-    let (all, only) = (outcome(&whole), outcome(&alone));
-    assert_eq!((all.verdict, all.p_value), (only.verdict, only.p_value));
-    assert!(only.accepted.is_empty());
-    assert_eq!(whole.rows[0].truth, alone.rows[0].truth);
-}
-
-/// The parts that are taken out are stated, and change no trial.
-#[test]
-fn a_diagnosis_with_parts_taken_out_is_another() {
-    let study = oscillator();
-    let place = tempfile::tempdir().unwrap();
-    let card = |ablated: &[Ablation], name: &str| {
-        let settings = TrialSettings {
-            trials: 1,
-            kinds: vec![Kind::Listed],
             ablated: ablated.to_vec(),
             ..TrialSettings::default()
         };
         let sealed = sealed(&study, settings, &place.path().join(name)).unwrap();
         sealed.score(&Progress::silent()).unwrap()
     };
-    let whole = card(&[], "whole");
+    let (whole, alone) = (card(false, &[], "whole"), card(true, &[], "verdicts"));
+    let outcome = |card: &Scorecard| card.rows[0].outcome().cloned().unwrap();
+    let (all, only) = (outcome(&whole), outcome(&alone));
+    assert_eq!((all.verdict, all.p_value), (only.verdict, only.p_value));
+    assert!(only.accepted.is_empty());
+    assert_eq!(whole.rows[0].truth, alone.rows[0].truth);
     assert!(whole.rows[0].answer.greedy.is_some() && whole.setup.settings.ablated.is_empty());
-    let without = card(&Ablation::ALL, "without");
+    let without = card(true, &Ablation::ALL, "without");
     assert_eq!(without.rows[0].truth, whole.rows[0].truth);
     let all = "without fitted-noise, unknown-functions, evidence";
     assert!(
@@ -224,6 +208,7 @@ fn steadiness_asks_every_question_again() {
     let study = oscillator();
     let place = tempfile::tempdir().unwrap();
     let settings = TrialSettings {
+        trials: 1,
         steadiness: 1,
         ..two()
     };
