@@ -15,7 +15,7 @@ use trials::*;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use truetwin::progress::{Listener, Progress};
 use truetwin::record::{Drive, Record, Signal};
-use truetwin::study::StudyFile;
+use truetwin::study::{Study, StudyFile};
 use truetwin::twin::{Integrator, Noise, Twin};
 
 /// Rate of false alarms that the tests of it claim. Measured: none in 251 sealed trials (docs/withheld.md).
