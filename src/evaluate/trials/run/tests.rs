@@ -194,7 +194,7 @@ fn parts_of_a_diagnosis_change_no_trial() {
     assert!(only.accepted.is_empty());
     assert_eq!(whole.rows[0].truth, alone.rows[0].truth);
     assert!(whole.rows[0].answer.greedy.is_some() && whole.setup.settings.ablated.is_empty());
-    let without = card(true, &Ablation::ALL, "without");
+    let without = card(false, &Ablation::ALL, "without");
     assert_eq!(without.rows[0].truth, whole.rows[0].truth);
     let all = "without fitted-noise, unknown-functions, evidence";
     assert!(

@@ -286,7 +286,7 @@ fn what_a_distant_theta_absorbs_has_no_information() {
 /// above the least, on average.
 #[test]
 fn pairs_have_information_beside_each_other() {
-    let study = tanks(120);
+    let study = tanks(250);
     let sampler = sampler(&study);
     let all: Vec<f64> = (0..12)
         .map(|trial| draw(&sampler, Kind::Pair, trial).truth.information.unwrap())
@@ -303,7 +303,7 @@ fn pairs_have_information_beside_each_other() {
 /// A drift of the pump's gain is as well one of the pump, and of the tank that it fills.
 #[test]
 fn places_of_the_same_meaning_are_in_the_key() {
-    let study = tanks(80);
+    let study = tanks(250);
     let sampler = sampler(&study);
     let places = |trial| {
         let truth = draw(&sampler, Kind::Listed, trial).truth;
