@@ -147,7 +147,36 @@ fn csv_text(theta: &Array2<f64>, features: &Array2<f64>, names: &[&str]) -> io::
     csv.into_inner().map_err(|error| error.into_error())
 }
 
-fn from_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
+/// A reader that knows whether its bytes end with a line.
+struct WithEnd<R> {
+    from: R,
+    last: u8,
+}
+
+impl<R: Read> Read for WithEnd<R> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let read = self.from.read(to)?;
+        if let Some(last) = to[..read].last() {
+            self.last = *last;
+        }
+        Ok(read)
+    }
+}
+
+/// Rows of a CSV file. A last line without an end may be cut within a number, which nothing else would tell.
+fn from_csv(from: impl Read, names: &[&str]) -> Result<Draws, String> {
+    let mut file = WithEnd { from, last: b'\n' };
+    let draws = rows_of_csv(&mut file, names)?;
+    match file.last {
+        b'\n' | b'\r' => Ok(draws),
+        _ => Err(format!(
+            "row {}, the last one, has no end of line and may be cut; make the file again, or end the row if it is whole",
+            draws.theta.nrows()
+        )),
+    }
+}
+
+fn rows_of_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
     let mut csv = Rows::new(file);
     let found = csv.header().map_err(|error| error.to_string())?;
     let d = names.len();
@@ -305,5 +334,7 @@ mod tests {
         assert!(refused("header.csv", b"a,c,x1\n1,2,3\n").contains("a,b,x1"));
         assert!(refused("cell.csv", b"a,b,x1\n1,2,z\n").contains("\"z\" is no number"));
         assert!(refused("ragged.csv", b"a,b,x1\n1,2\n").contains("2 fields"));
+        let cut = refused("cut.csv", b"a,b,x1\n1,2,0.125\n1,2,0.1");
+        assert!(cut.contains("row 2, the last one"), "{cut}");
     }
 }
