@@ -79,7 +79,8 @@ pub(in crate::diagnose) fn left_the_prior(
     Ok((ratio > limit, within))
 }
 
-/// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does: best first.
+/// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does, and that are more probable there than
+/// nothing: best first.
 pub(in crate::diagnose) fn absorbing(
     free: &Model,
     within: &Model,
@@ -89,6 +90,6 @@ pub(in crate::diagnose) fn absorbing(
     let mut found = listed(within, terms, Before::default(), breadth)?;
     let best = free.fitted.log_likelihood - THRESHOLDS.absorbs;
     let is_as_good = |model: &Model| model.fitted.log_likelihood >= best;
-    found.retain(|e| e.model.as_ref().is_some_and(is_as_good));
+    found.retain(|e| e.log_z > within.log_evidence && e.model.as_ref().is_some_and(is_as_good));
     Ok(found)
 }

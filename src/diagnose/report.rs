@@ -232,7 +232,7 @@ impl Report<'_> {
                     answer.decision = Decision::Absorbed;
                     answer.class = all.iter().flat_map(|e| e.last().keys()).collect();
                 }
-                explained = absorbed(&all, within.log_evidence);
+                explained = absorbed(&all, within.log_evidence, &answer.posterior);
             }
             _ => {}
         }

@@ -1,8 +1,8 @@
 //! Computes the expressions of a text: its equations, point after point and in blocks.
 
-use super::feed::{LanesFeed, PointsFeed};
+use super::feed::{LanesFeed, PointsFeed, TapeFeed};
 use super::tape::OperationTape;
-use crate::math::{LANES, Lanes};
+use crate::math::{Kernel, LANES, Lanes, widest};
 use crate::twin::{Blocks, Integrator, Interval, Now, Outline, StateSpace, Stepping};
 use smallvec::SmallVec;
 use std::cell::Cell;
@@ -34,9 +34,28 @@ pub(super) struct Tapes {
     pub ends: Option<OperationTape>,
 }
 
-/// Numbers of a group of points, those of the narrowest vectors. Twice as many gain nothing below forty points, and functions such as sin
+/// Numbers of a group of points, those of the narrowest vectors. Twice as many gain nothing below [`MANY_POINTS`], and functions such as sin
 /// are computed for what fills a group up, too.
 const FEW: usize = 2;
+/// Numbers of a group of many points, those of the widest vectors.
+const MANY: usize = 8;
+/// Points from which on wide groups are no slower than narrow ones.
+const MANY_POINTS: usize = 40;
+
+/// A tape over a feed, for the widest vectors.
+struct Wide<'t, F, const G: usize> {
+    tape: &'t OperationTape,
+    feed: F,
+}
+
+impl<F: TapeFeed<G>, const G: usize> Kernel for Wide<'_, F, G> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        self.tape.run::<G>(&mut self.feed);
+    }
+}
 
 impl OperationTape {
     /// Computes the outputs of one point.
@@ -70,7 +89,11 @@ impl OperationTape {
         match count {
             0 => {}
             1 => self.run::<1>(&mut points),
-            _ => self.run::<FEW>(&mut points),
+            _ if count < MANY_POINTS => self.run::<FEW>(&mut points),
+            _ => widest(Wide::<_, MANY> {
+                tape: self,
+                feed: points,
+            }),
         }
     }
 }
@@ -176,7 +199,7 @@ impl Blocks for Program {
         let steps: [f64; LANES] = std::array::from_fn(|lane| now.get(lane).unwrap_or(&now[0]).dt);
         let x = Cell::from_mut(x).as_slice_of_cells();
         let is_discrete = self.integrator == Integrator::Discrete;
-        self.tapes.drift.run(&mut LanesFeed {
+        let feed = LanesFeed {
             now,
             points,
             states,
@@ -192,6 +215,10 @@ impl Blocks for Program {
                     }
                 })));
             },
+        };
+        widest(Wide {
+            tape: &self.tapes.drift,
+            feed,
         });
     }
 
@@ -203,12 +230,16 @@ impl Blocks for Program {
             }
             return;
         }
-        self.tapes.observe.run(&mut LanesFeed {
+        let feed = LanesFeed {
             now,
             points: x.len() / states,
             states,
             load: |index: usize| x[index],
             take: |point: usize, _: usize, values: Lanes| y[point] = values,
+        };
+        widest(Wide {
+            tape: &self.tapes.observe,
+            feed,
         });
     }
 }

@@ -14,7 +14,7 @@ pub(super) struct Numbers {
 }
 
 thread_local! {
-    static KEPT_NUMBERS: RefCell<Vec<((u64, usize), Numbers)>> = const { RefCell::new(Vec::new()) };
+    static KEPT_NUMBERS: RefCell<Vec<(Kind, Box<Numbers>)>> = const { RefCell::new(Vec::new()) };
 }
 
 /// Returns the number of a new tape.
@@ -23,25 +23,28 @@ pub(super) fn new_id() -> u64 {
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// Calls `work` with the numbers of a tape, as its last call on this thread left them; those of the first are made by `begin`.
-#[inline(always)]
-pub(super) fn with_numbers(
-    of: (u64, usize),
-    begin: impl FnOnce() -> Numbers,
-    work: impl FnOnce(&mut Numbers),
-) {
+/// Tape, and numbers of a group.
+pub(super) type Kind = (u64, usize);
+
+/// Takes the numbers of a tape as its last call on this thread left them, if it kept them.
+///
+/// They are taken and given back, and not lent to a closure: what runs on them is then compiled for the vectors of its caller.
+#[inline]
+pub(super) fn take_numbers(kind: Kind) -> Option<Box<Numbers>> {
     KEPT_NUMBERS.with_borrow_mut(|kept| {
-        let at = match kept.iter().position(|(other, _)| *other == of) {
-            Some(at) => at,
-            None => {
-                // The oldest goes: what is at work is soon made again.
-                if kept.len() >= KEPT {
-                    kept.remove(0);
-                }
-                kept.push((of, begin()));
-                kept.len() - 1
-            }
-        };
-        work(&mut kept[at].1);
+        let at = kept.iter().rposition(|(other, _)| *other == kind)?;
+        Some(kept.swap_remove(at).1)
+    })
+}
+
+/// Keeps the numbers of a tape for its next call on this thread.
+#[inline]
+pub(super) fn keep_numbers(kind: Kind, numbers: Box<Numbers>) {
+    KEPT_NUMBERS.with_borrow_mut(|kept| {
+        // Any may go: what is at work is soon made again.
+        if kept.len() >= KEPT {
+            kept.swap_remove(0);
+        }
+        kept.push((kind, numbers));
     });
 }

@@ -6,7 +6,7 @@
 use super::feed::TapeFeed;
 use super::graph::{Graph, Id, Node, Varies};
 use super::groups::{Place, PlacedOperation, Work, load, store};
-use super::scratch::{Numbers, new_id, with_numbers};
+use super::scratch::{Numbers, keep_numbers, new_id, take_numbers};
 use std::cell::Cell;
 
 /// Numbers of a value that go through an operation together: those of all values of a small twin then stay in the fastest memory. Twice
@@ -206,15 +206,12 @@ impl OperationTape {
     /// Computes the outputs of all points of a feed.
     #[inline(always)]
     pub fn run<const G: usize>(&self, feed: &mut impl TapeFeed<G>) {
-        with_numbers(
-            (self.id, G),
-            || self.begin::<G>(),
-            |numbers| {
-                let cells = Cell::from_mut(&mut numbers.values[..]).as_slice_of_cells();
-                self.prepare(feed, cells, &numbers.operations);
-                self.each_block(feed, cells, &numbers.operations[2]);
-            },
-        );
+        let kind = (self.id, G);
+        let mut numbers = take_numbers(kind).unwrap_or_else(|| self.begin::<G>());
+        let cells = Cell::from_mut(&mut numbers.values[..]).as_slice_of_cells();
+        self.prepare(feed, cells, &numbers.operations);
+        self.each_block(feed, cells, &numbers.operations[2]);
+        keep_numbers(kind, numbers);
     }
 
     /// First number of the first slot that has many groups.
@@ -225,7 +222,7 @@ impl OperationTape {
 
     /// Returns numbers and operations of a thread that has none of this tape yet.
     #[cold]
-    fn begin<const G: usize>(&self) -> Numbers {
+    fn begin<const G: usize>(&self) -> Box<Numbers> {
         let first = self.first::<G>();
         let mut values = vec![f64::NAN; first + self.each as usize * (together(G) * G)];
         for &(value, slot) in &self.constants {
@@ -241,7 +238,7 @@ impl OperationTape {
             };
             list.iter().map(placed).collect()
         });
-        Numbers { values, operations }
+        Box::new(Numbers { values, operations })
     }
 
     /// Computes what is the same for all points.

@@ -158,8 +158,8 @@ numbers! {
 pub(crate) struct Passes(Arc<AtomicU64>);
 
 impl Passes {
-    pub fn count(&self) {
-        self.0.fetch_add(1, Ordering::Relaxed);
+    pub fn count(&self, more: usize) {
+        self.0.fetch_add(more as u64, Ordering::Relaxed);
     }
 
     pub fn so_far(&self) -> u64 {

@@ -286,6 +286,28 @@ impl Problem {
         Ok(self.evaluate(theta)?.log_likelihood)
     }
 
+    /// Log-likelihoods of all records at several θ, on all cores; `None` where the twin does not work.
+    pub fn log_likelihoods(&self, thetas: &[Vec<f64>]) -> Result<Vec<Option<f64>>, FilterError> {
+        let mut sums = vec![Some(0.0); thetas.len()];
+        for (r, record) in self.records.iter().enumerate() {
+            let own: Vec<Vec<f64>> = thetas.iter().map(|t| self.of_record(r, t)).collect();
+            self.passes.count(own.len());
+            let values = self.likelihood.log_likelihoods(&own, record)?;
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum = sum.zip(value).map(|(sum, value)| sum + value);
+            }
+        }
+        Ok(sums)
+    }
+
+    /// As [`log_likelihoods`](Self::log_likelihoods), with the priors of all axes.
+    pub fn log_posteriors(&self, thetas: &[Vec<f64>]) -> Result<Vec<Option<f64>>, FilterError> {
+        let values = self.log_likelihoods(thetas)?.into_iter().zip(thetas);
+        Ok(values
+            .map(|(value, theta)| value.map(|value| value + self.log_prior(theta, true)))
+            .collect())
+    }
+
     /// Log-likelihood of all records at θ, with the innovations of a black box.
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, FilterError> {
         let (mut log_likelihood, mut innovations) = (0.0, Some(vec![]));
@@ -311,7 +333,7 @@ impl Problem {
 
     /// The likelihood, about to pass over a record.
     fn counted(&self) -> &dyn Likelihood {
-        self.passes.count();
+        self.passes.count(1);
         self.likelihood.as_ref()
     }
 

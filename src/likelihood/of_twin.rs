@@ -3,9 +3,11 @@
 use super::ensemble;
 use super::kalman::{
     Coordinates, FilterError, FilterSettings, Filtered, Kalman, Responses, Score, States,
+    recoverable,
 };
 use crate::record::{Record, Signal};
 use crate::twin::{Composed, ComposedBlackBox, DigitalTwin, Outline, Twin};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Likelihood of a record at θ.
@@ -30,6 +32,12 @@ pub(crate) trait Likelihood: Send + Sync {
         theta: &[f64],
         record: &Record,
     ) -> Result<(f64, Option<Filtered>), FilterError>;
+    /// Log-likelihoods at several θ, on all cores; `None` where the twin does not work.
+    fn log_likelihoods(
+        &self,
+        thetas: &[Vec<f64>],
+        record: &Record,
+    ) -> Result<Vec<Option<f64>>, FilterError>;
     /// Gradient and information; `None` where only differences give them.
     fn score(
         &self,
@@ -99,6 +107,13 @@ impl Likelihood for FilterLikelihood {
         let kalman = self.kalman(record, &self.1)?;
         Ok((kalman.log_likelihood(theta)?, None))
     }
+    fn log_likelihoods(
+        &self,
+        thetas: &[Vec<f64>],
+        record: &Record,
+    ) -> Result<Vec<Option<f64>>, FilterError> {
+        self.kalman(record, &self.1)?.log_likelihoods(thetas)
+    }
     fn score(
         &self,
         theta: &[f64],
@@ -154,6 +169,17 @@ impl Likelihood for EnsembleLikelihood {
     ) -> Result<(f64, Option<Filtered>), FilterError> {
         let filtered = self.filtered(theta, record)?;
         Ok((filtered.log_likelihood, Some(filtered)))
+    }
+    fn log_likelihoods(
+        &self,
+        thetas: &[Vec<f64>],
+        record: &Record,
+    ) -> Result<Vec<Option<f64>>, FilterError> {
+        let value = |theta: &Vec<f64>| {
+            let found = recoverable(self.filtered(theta, record))?;
+            Ok(found.map(|filtered| filtered.log_likelihood))
+        };
+        thetas.par_iter().map(value).collect()
     }
     fn score(&self, _: &[f64], _: &Record, _: &Coordinates) -> Result<Option<Score>, FilterError> {
         Ok(None)

@@ -1,6 +1,7 @@
 //! Summary of fits for a report.
 
 use super::Answer;
+use super::posterior::Posterior;
 use crate::diagnose::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};
 use crate::diagnose::search::Explanations;
 use crate::diagnose::settings::DiagnoseSettings;
@@ -54,11 +55,19 @@ pub(in crate::diagnose) fn effects(
     all
 }
 
-/// Effects that absorb a parameter gap beside the twin within its prior, of this log Z; each is as probable as the others.
-pub(in crate::diagnose) fn absorbed(all: &[Explanation], within: f64) -> Vec<EffectFit> {
-    let share = 1.0 / all.len().max(1) as f64;
+/// Effects that absorb a parameter gap beside the twin within its prior, of this log Z.
+pub(in crate::diagnose) fn absorbed(
+    all: &[Explanation],
+    within: f64,
+    posterior: &Posterior,
+) -> Vec<EffectFit> {
     (all.iter())
-        .filter_map(|e| Some(fit_of(e.model.as_ref()?, e.last(), share, e.log_z - within)))
+        .filter_map(|e| {
+            let term = e.last();
+            let probability = posterior.name(&term.key());
+            let gain = e.log_z - within;
+            Some(fit_of(e.model.as_ref()?, term, probability, gain))
+        })
         .take(THRESHOLDS.reported)
         .collect()
 }

@@ -5,7 +5,7 @@ use super::sizes::SizePrior;
 use crate::fit::axis::EvidencePrior;
 use crate::fit::budget::BUDGET;
 use crate::fit::posterior::{PosteriorSample, Proposal, Round, effective};
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::kalman::FilterError;
 use crate::math::deviation;
 use crate::twin::Noise;
 use nalgebra::DVector;
@@ -28,15 +28,7 @@ impl Expansion<'_> {
         let mut proposals = first.clone();
         let count = (BUDGET.evidence_samples / self.problem.samples())
             .clamp(BUDGET.least_evidence_draws, BUDGET.most_evidence_draws);
-        let log_target = |phi: &DVector<f64>| {
-            let log_prior = self.log_prior(&phi.select_rows(&self.free), blocks);
-            if log_prior == f64::NEG_INFINITY {
-                return Ok(None);
-            }
-            let theta = self.problem.coordinates.theta(phi.as_slice());
-            let value = recoverable(self.problem.log_likelihood(&theta))?;
-            Ok(value.map(|value| value + log_prior))
-        };
+        let log_prior = |phi: &DVector<f64>| self.log_prior(&phi.select_rows(&self.free), blocks);
         let mut source = noise.source("evidence");
         let mut logs = self.reweighed(sample, blocks);
         let mut found = mean_weight(&logs);
@@ -44,7 +36,7 @@ impl Expansion<'_> {
             if found.is_some_and(|(_, error, _)| error <= BUDGET.evidence_error) {
                 break;
             }
-            let round = Round::new(self.problem, &proposals, count, &mut source, log_target)?;
+            let round = Round::new(self.problem, &proposals, count, &mut source, log_prior)?;
             proposals = round.adapted(&first, BUDGET.kept_covariance);
             logs.extend(round.logs);
             found = mean_weight(&logs);

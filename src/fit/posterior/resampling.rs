@@ -4,7 +4,7 @@ use super::sampler::{Proposal, Round};
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use nalgebra::DVector;
 
@@ -55,17 +55,13 @@ pub(crate) fn posterior(
         return Ok(PosteriorSample::default());
     }
     let c = &problem.coordinates;
-    let log_posterior = |phi: &DVector<f64>| {
-        let theta = c.theta(phi.as_slice());
-        let value = recoverable(problem.log_likelihood(&theta))?;
-        Ok(value.map(|l| l + problem.log_prior(&theta, true)))
-    };
+    let log_prior = |phi: &DVector<f64>| problem.log_prior(&c.theta(phi.as_slice()), true);
     let (rounds, size) = match count {
         Some(count) => (BUDGET.adaptations, usual.max(BUDGET.draws_each * count)),
         None => (1, usual),
     };
     let mut proposals = first.clone();
-    let mut round = Round::new(problem, &proposals, usual, &mut source, log_posterior)?;
+    let mut round = Round::new(problem, &proposals, usual, &mut source, log_prior)?;
     let mut better = (best.objective + BUDGET.better_draw, None);
     let mut look = |round: &Round| {
         if let Some((phi, value)) = round.best()
@@ -78,7 +74,7 @@ pub(crate) fn posterior(
     for left in (0..rounds).rev() {
         proposals = round.adapted(&first, BUDGET.kept_covariance);
         let size = if left == 0 { size } else { usual };
-        round = Round::new(problem, &proposals, size, &mut source, log_posterior)?;
+        round = Round::new(problem, &proposals, size, &mut source, log_prior)?;
         look(&round);
     }
     let taken = round.taken(count.unwrap_or(usual));

@@ -112,41 +112,53 @@ pub(in crate::fit) struct Round {
 }
 
 impl Round {
-    /// Draws `count` points and weighs them by `log_target`, which is none where the twin does not work.
+    /// Draws `count` points and weighs them by likelihood and prior.
     pub fn new(
         problem: &Problem,
         proposals: &[Proposal],
         count: usize,
         source: &mut Source,
-        log_target: impl Fn(&DVector<f64>) -> Result<Option<f64>, FilterError> + Sync,
+        log_prior: impl Fn(&DVector<f64>) -> f64,
     ) -> Result<Self, FilterError> {
         let draws: Vec<DVector<f64>> = (0..count)
             .map(|i| proposals[i % proposals.len()].draw(source))
             .collect();
         let c = &problem.coordinates;
-        let each: Vec<(usize, f64, f64)> = (draws.par_iter())
+        let mut targets: Vec<f64> = (draws.iter())
+            .map(|phi| match c.clamp(phi) == *phi {
+                true => log_prior(phi),
+                // Beyond the bounds nothing is possible.
+                false => f64::NEG_INFINITY,
+            })
+            .collect();
+        let possible: Vec<usize> = (0..count)
+            .filter(|&i| targets[i] > f64::NEG_INFINITY)
+            .collect();
+        let thetas: Vec<Vec<f64>> = (possible.iter())
+            .map(|&i| c.theta(draws[i].as_slice()))
+            .collect();
+        for (&i, value) in possible.iter().zip(problem.log_likelihoods(&thetas)?) {
+            targets[i] += value.unwrap_or(f64::NEG_INFINITY);
+        }
+        let of_proposals: Vec<(usize, f64)> = (draws.par_iter())
             .map(|phi| {
                 let densities: Vec<f64> = proposals.iter().map(|q| q.log_density(phi)).collect();
                 let mode = (0..densities.len())
                     .max_by(|&a, &b| densities[a].total_cmp(&densities[b]))
                     .unwrap_or(0);
-                // Beyond the bounds nothing is possible.
-                if c.clamp(phi) != *phi {
-                    return Ok((mode, f64::NEG_INFINITY, f64::NEG_INFINITY));
-                }
-                let target = log_target(phi)?.unwrap_or(f64::NEG_INFINITY);
                 let top = densities[mode];
                 let sum: f64 = densities.iter().map(|d| (d - top).exp()).sum();
-                let mixture = top + (sum / densities.len() as f64).ln();
-                Ok((mode, target, target - mixture))
+                (mode, top + (sum / densities.len() as f64).ln())
             })
-            .collect::<Result<_, FilterError>>()?;
-        let logs: Vec<f64> = each.iter().map(|e| e.2).collect();
+            .collect();
+        let logs: Vec<f64> = (targets.iter().zip(&of_proposals))
+            .map(|(target, (_, mixture))| target - mixture)
+            .collect();
         let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Ok(Self {
             draws,
-            modes: each.iter().map(|e| e.0).collect(),
-            targets: each.iter().map(|e| e.1).collect(),
+            modes: of_proposals.iter().map(|(mode, _)| *mode).collect(),
+            targets,
             weights: logs.iter().map(|log| (log - top).exp()).collect(),
             logs,
             free: proposals.first().map_or(vec![], |q| q.free.clone()),

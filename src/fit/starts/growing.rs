@@ -7,10 +7,9 @@ use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
 use crate::fit::starts::climbs;
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::twin::Noise;
-use rayon::prelude::*;
 
 /// The best θ of all starts; `None` where the twin can be simulated at none.
 pub(crate) fn base_fit(
@@ -41,12 +40,7 @@ pub(crate) fn base_fit(
             .collect();
         let short = problem.on(begun);
         if level == 0 {
-            let values: Vec<Option<f64>> = (starts.par_iter())
-                .map(|theta| {
-                    let value = recoverable(short.log_likelihood(theta))?;
-                    Ok(value.map(|v| v + short.log_prior(theta, true)))
-                })
-                .collect::<Result<_, FilterError>>()?;
+            let values = short.log_posteriors(&starts)?;
             let mut all: Vec<(f64, Vec<f64>)> = (values.into_iter().zip(starts))
                 .filter_map(|(value, theta)| Some((value?, theta)))
                 .collect();

@@ -9,7 +9,7 @@ pub(crate) use spectral::spectral_starts;
 use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::problem::Problem;
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use rayon::prelude::*;
 
@@ -105,8 +105,7 @@ impl Screen {
 /// The best of random points.
 fn screened(problem: &Problem, noise: Noise, screen: Screen) -> Result<Vec<Vec<f64>>, FilterError> {
     let space = problem.twin.parameters();
-    let mut screened: Vec<(f64, Vec<f64>)> = (0..screen.points)
-        .into_par_iter()
+    let points: Vec<Vec<f64>> = (0..screen.points)
         .map(|i| {
             let noise = noise.sample(i);
             let theta = problem.full(&match i % 2 {
@@ -114,15 +113,16 @@ fn screened(problem: &Problem, noise: Noise, screen: Screen) -> Result<Vec<Vec<f
                 _ => space.draw_bounds(noise),
             });
             let theta = problem.drawn(theta, noise);
-            let theta = match screen.is_loud {
+            match screen.is_loud {
                 true => problem.begin(&theta),
                 false => problem.believed(&theta),
-            };
-            let value = recoverable(problem.log_likelihood(&theta))?;
-            Ok(value.map(|v| (v + problem.log_prior(&theta, true), theta)))
+            }
         })
-        .filter_map(Result::transpose)
-        .collect::<Result<_, FilterError>>()?;
+        .collect();
+    let values = problem.log_posteriors(&points)?;
+    let mut screened: Vec<(f64, Vec<f64>)> = (values.into_iter().zip(points))
+        .filter_map(|(value, theta)| Some((value?, theta)))
+        .collect();
     screened.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut starts: Vec<Vec<f64>> = vec![];
     for (_, theta) in screened {

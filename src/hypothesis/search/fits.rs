@@ -8,7 +8,7 @@ use crate::fit::problem::Problem;
 use crate::fit::spectral_starts;
 use crate::fit::starts::{Care, search};
 use crate::hypothesis::limits::SEARCH;
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use rayon::prelude::*;
 
@@ -183,12 +183,11 @@ fn likeliest(
     points: [Vec<f64>; SHARES.len()],
 ) -> Result<Option<Vec<f64>>, FilterError> {
     let mut best: Option<(f64, Vec<f64>)> = None;
-    for theta in points {
-        if let Some(value) = recoverable(problem.log_likelihood(&theta))? {
-            let value = value + problem.log_prior(&theta, true);
-            if best.as_ref().is_none_or(|(b, _)| value > *b) {
-                best = Some((value, theta));
-            }
+    for (value, theta) in problem.log_posteriors(&points)?.into_iter().zip(points) {
+        if let Some(value) = value
+            && best.as_ref().is_none_or(|(b, _)| value > *b)
+        {
+            best = Some((value, theta));
         }
     }
     Ok(best.map(|(_, theta)| theta))

@@ -310,7 +310,7 @@ pub(super) fn add_outer<N: Number>(deviations: &[N], n: usize, sum: &mut [N]) {
     if n <= KNOWN {
         add_rows(deviations, n, sum);
     } else {
-        widest(SumOfRows { deviations, n, sum });
+        widest(SumOfTiles { deviations, n, sum });
     }
 }
 
@@ -327,17 +327,89 @@ fn add_rows<N: Number>(deviations: &[N], n: usize, sum: &mut [N]) {
     }
 }
 
-struct SumOfRows<'w, N> {
+/// Rows and columns of a tile, whose sums stay in the registers of the widest vectors while the deviations go by.
+const TILE: (usize, usize) = (4, 8);
+
+/// As [`add_rows`], tile by tile of the lower triangle.
+struct SumOfTiles<'w, N> {
     deviations: &'w [N],
     n: usize,
     sum: &'w mut [N],
 }
 
-impl<N: Number> Kernel for SumOfRows<'_, N> {
+impl<N: Number> SumOfTiles<'_, N> {
+    /// The tile of `R` rows from i on, and a tile's columns from j on.
+    #[inline(always)]
+    fn add_tile<const R: usize>(&mut self, i: usize, j: usize) {
+        let n = self.n;
+        let mut entries = [[N::ZERO; TILE.1]; R];
+        for (r, entries) in entries.iter_mut().enumerate() {
+            let from = (i + r) * n + j;
+            entries.copy_from_slice(&self.sum[from..from + TILE.1]);
+        }
+        for d in self.deviations.chunks_exact(n) {
+            let (down, across) = (&d[i..i + R], &d[j..j + TILE.1]);
+            for (entries, down) in entries.iter_mut().zip(down) {
+                for (entry, across) in entries.iter_mut().zip(across) {
+                    *entry += *down * *across;
+                }
+            }
+        }
+        for (r, entries) in entries.iter().enumerate() {
+            let to = (i + r) * n + j;
+            self.sum[to..to + TILE.1].copy_from_slice(entries);
+        }
+    }
+}
+
+impl<N: Number> Kernel for SumOfTiles<'_, N> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
-        add_rows(self.deviations, self.n, self.sum);
+    fn run(mut self) {
+        let (n, (rows, columns)) = (self.n, TILE);
+        let tiled = n - n % columns;
+        for j in (0..tiled).step_by(columns) {
+            // Above the diagonal a tile's entries are overwritten below.
+            let end = n - (n - j) % rows;
+            for i in (j..end).step_by(rows) {
+                self.add_tile::<{ TILE.0 }>(i, j);
+            }
+            for i in end..n {
+                self.add_tile::<1>(i, j);
+            }
+        }
+        for i in tiled..n {
+            for j in tiled..=i {
+                let mut entry = self.sum[i * n + j];
+                for d in self.deviations.chunks_exact(n) {
+                    entry += d[i] * d[j];
+                }
+                self.sum[i * n + j] = entry;
+            }
+        }
+        for i in 0..n {
+            for j in 0..i {
+                self.sum[j * n + i] = self.sum[i * n + j];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tiles add up in the order of rows, for sizes with and without what is left beside tiles.
+    #[test]
+    fn a_sum_of_products_has_the_same_bits_in_tiles() {
+        for n in [11, 12, 16, 23, 40] {
+            let deviations: Vec<f64> = (0..2 * n * n).map(|i| (i as f64 * 0.37).sin()).collect();
+            let mut rows: Vec<f64> = (0..n * n).map(|i| ((i / n) * (i % n)) as f64).collect();
+            let mut tiles = rows.clone();
+            add_rows(&deviations, n, &mut rows);
+            add_outer(&deviations, n, &mut tiles);
+            assert_eq!(rows, tiles, "{n} states");
+        }
     }
 }

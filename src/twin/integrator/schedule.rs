@@ -140,13 +140,23 @@ pub(super) struct SubstepSchedule {
     next: f64,
     /// Largest size of each state of the centre so far.
     sizes: Vec<f64>,
-    /// `true` where rates jumped in the last sample.
-    was_rough: bool,
-    /// `true` where steps are of one length, and no high order is of use.
+    /// `true` where rates jump in this sample: steps are then of one length, and no high order is of use.
     is_even: bool,
     explicit: ExplicitPair,
     implicit: Rosenbrock,
+    buffers: ScheduleBuffers,
     taken: StepsTaken,
+}
+
+/// Buffers of a sample's choice, kept so that none allocates.
+#[derive(Debug, Clone, Default)]
+struct ScheduleBuffers {
+    /// Points and sizes before the first step.
+    start: Vec<f64>,
+    sizes: Vec<f64>,
+    /// Points behind a step, and its errors.
+    trial: Vec<f64>,
+    errors: Vec<f64>,
 }
 
 impl SubstepSchedule {
@@ -166,10 +176,10 @@ impl SubstepSchedule {
             stretches: vec![],
             next: f64::INFINITY,
             sizes: vec![0.0; states],
-            was_rough: false,
             is_even: false,
             explicit: ExplicitPair::default(),
             implicit: Rosenbrock::default(),
+            buffers: ScheduleBuffers::default(),
             taken: StepsTaken::default(),
         })
     }
@@ -235,33 +245,35 @@ impl SubstepSchedule {
 
     /// Chooses the method and the substeps of this way, and takes them.
     fn choose(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], rules: &WayRules<'_>) {
-        let (start, sizes) = (x.to_vec(), self.sizes.clone());
-        self.is_even = false;
+        let mut buffers = std::mem::take(&mut self.buffers);
+        buffers.begin(x, &self.sizes);
+        let was_rough = std::mem::take(&mut self.is_even);
+        let begins_rough = was_rough && self.jumps(path, x, 0.0, [1.0 / EVEN as f64, 1.0]);
         let most = match self.may_change && !self.is_implicit {
             true => MANY,
             false => usize::MAX,
         };
-        let mut outcome = self.tried(path, x, rules, most);
+        let mut outcome = match begins_rough {
+            true => SampleSteps::Rough,
+            false => self.tried(path, x, rules, (most, &mut buffers)),
+        };
         if let SampleSteps::Many { covered } = outcome {
             let explicit = MANY as f64 / covered.max(SHORTEST);
             let most = (explicit / WORTH).min(MOST_SUBSTEPS as f64) as usize;
-            x.copy_from_slice(&start);
-            self.sizes.clone_from(&sizes);
+            buffers.undo(x, &mut self.sizes);
             self.is_implicit = true;
-            outcome = self.tried(path, x, rules, most);
+            outcome = self.tried(path, x, rules, (most, &mut buffers));
             if !matches!(outcome, SampleSteps::Done) {
                 self.is_implicit = false;
-                x.copy_from_slice(&start);
-                self.sizes.clone_from(&sizes);
-                outcome = self.tried(path, x, rules, usize::MAX);
+                buffers.undo(x, &mut self.sizes);
+                outcome = self.tried(path, x, rules, (usize::MAX, &mut buffers));
             }
         }
-        self.was_rough = matches!(outcome, SampleSteps::Rough);
-        if self.was_rough {
-            x.copy_from_slice(&start);
-            self.sizes.clone_from(&sizes);
-            self.take_even_steps(path, x, rules);
+        if matches!(outcome, SampleSteps::Rough) {
+            buffers.undo(x, &mut self.sizes);
+            self.take_even_steps(path, x, (rules, &mut buffers.trial));
         }
+        self.buffers = buffers;
         self.taken.samples += 1;
         self.taken.substeps += self.stretches.len();
         self.taken.most = self.taken.most.max(self.stretches.len());
@@ -274,7 +286,7 @@ impl SubstepSchedule {
         path: &mut Path<'_, '_>,
         x: &mut [f64],
         rules: &WayRules<'_>,
-        most: usize,
+        (most, buffers): (usize, &mut ScheduleBuffers),
     ) -> SampleSteps {
         let (n, dt) = (self.sizes.len(), path.now.dt);
         let mut rules = rules.clone();
@@ -282,14 +294,11 @@ impl SubstepSchedule {
             true => rosenbrock::ORDER,
             false => pair::ORDER,
         };
-        let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
+        let ScheduleBuffers { trial, errors, .. } = buffers;
         let (mut next, mut from, mut steps, mut shortest) = (self.next, 0.0, 0, SHORTEST);
         let mut falls = Falls::default();
         let patience = if x.len() > n { FEW } else { MANY };
         self.stretches.clear();
-        if self.was_rough && self.jumps(path, x, 0.0, [1.0 / EVEN as f64, 1.0]) {
-            return SampleSteps::Rough;
-        }
         while from < 1.0 {
             if steps >= patience && falls.repeat() {
                 return SampleSteps::Rough;
@@ -316,8 +325,8 @@ impl SubstepSchedule {
                 length: (end - from) / parts,
             };
             trial.copy_from_slice(x);
-            self.step(path, of, &mut trial, Some(&mut errors));
-            let size = self.largest((x, &trial), &errors);
+            self.step(path, of, trial, Some(errors));
+            let size = self.largest((x, trial), errors);
             falls.see(size <= 1.0, self.explicit.reach());
             let factor = match size.is_finite() {
                 true => (SAFETY * size.powf(-1.0 / order)).clamp(CHANGE.0, CHANGE.1),
@@ -326,7 +335,7 @@ impl SubstepSchedule {
             next = factor * of.length * dt;
             if size <= 1.0 || longest <= shortest {
                 let reached = if parts == 1.0 { end } else { from + of.length };
-                from = self.keep(path, &mut rules, (of, reached), (x, &mut trial));
+                from = self.keep(path, &mut rules, (of, reached), (x, trial));
             }
         }
         self.next = next;
@@ -377,12 +386,17 @@ impl SubstepSchedule {
     }
 
     /// Takes steps of one length: what jumps is smooth at none, and a length that follows no point moves no point's result in leaps.
-    fn take_even_steps(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], rules: &WayRules<'_>) {
+    fn take_even_steps(
+        &mut self,
+        path: &mut Path<'_, '_>,
+        x: &mut [f64],
+        (rules, trial): (&WayRules<'_>, &mut [f64]),
+    ) {
         // Where rates are fast besides, as many as the smooth samples before took.
         let smooth = (path.now.dt / self.next).ceil() as usize;
         let least = (EVEN * self.least).min(MOST_SUBSTEPS);
         let longest = 1.0 / smooth.clamp(least, MOST_SUBSTEPS) as f64;
-        let (mut rules, mut trial, mut from) = (rules.clone(), x.to_vec(), 0.0);
+        let (mut rules, mut from) = (rules.clone(), 0.0);
         self.is_even = true;
         self.stretches.clear();
         while from < 1.0 {
@@ -393,9 +407,9 @@ impl SubstepSchedule {
                 length: (end - from) / parts,
             };
             trial.copy_from_slice(x);
-            self.step(path, of, &mut trial, None);
+            self.step(path, of, trial, None);
             let reached = if parts == 1.0 { end } else { from + of.length };
-            from = self.keep(path, &mut rules, (of, reached), (x, &mut trial));
+            from = self.keep(path, &mut rules, (of, reached), (x, trial));
         }
     }
 
@@ -427,6 +441,24 @@ impl SubstepSchedule {
             }
         }
         largest
+    }
+}
+
+impl ScheduleBuffers {
+    /// Remembers points and sizes before the first step.
+    fn begin(&mut self, x: &[f64], sizes: &[f64]) {
+        for buffer in [&mut self.start, &mut self.trial, &mut self.errors] {
+            buffer.clear();
+            buffer.extend_from_slice(x);
+        }
+        self.sizes.clear();
+        self.sizes.extend_from_slice(sizes);
+    }
+
+    /// Takes all steps back.
+    fn undo(&self, x: &mut [f64], sizes: &mut [f64]) {
+        x.copy_from_slice(&self.start);
+        sizes.copy_from_slice(&self.sizes);
     }
 }
 

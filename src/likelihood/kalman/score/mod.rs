@@ -1,13 +1,12 @@
 //! The gradient of the log-likelihood.
 
-mod beside;
 mod response;
 
+use super::beside::{Together, together};
 use super::order::Order;
 use super::pass::{Innovation, Sink};
 use super::{Coordinates, FilterError, Kalman};
 use crate::math::{LANES, Stencil};
-use beside::{Together, together};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 pub(crate) use response::Responses;

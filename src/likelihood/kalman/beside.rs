@@ -3,13 +3,17 @@
 //! Each number of the recursion is eight numbers ([`Lanes`]), one for each θ, which the processor handles together. The twin's equations stay
 //! plain f64 and are called for one lane after the other.
 
-use crate::likelihood::kalman::order::Order;
-use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
-use crate::likelihood::kalman::size::{Size, with_size};
-use crate::likelihood::kalman::update::Readings;
-use crate::likelihood::kalman::{Kalman, Method};
+use super::order::Order;
+use super::pass::{FilterJob, Innovation, Pass, Sink};
+use super::size::{Size, with_size};
+use super::update::Readings;
+use super::{FilterError, Kalman, Method, recoverable};
 use crate::math::{Kernel, LANES, Lanes, widest};
 use crate::twin::MOST_STATES;
+use rayon::prelude::*;
+
+/// So many filters take longer in lanes than one after the other: all lanes cost about two and a half of them.
+const TOO_FEW: usize = 2;
 
 /// Innovation and its variance, row by row; 0 and 1 where the output is missing.
 pub(super) type LaneRows = Vec<[Lanes; 2]>;
@@ -35,6 +39,11 @@ impl Together {
     pub fn lane(&self, i: usize) -> Option<usize> {
         self.lanes[i].filter(|&lane| self.log_likelihoods.0[lane].is_finite())
     }
+
+    /// log p(y | θ) of the i-th filter, where it has a [`lane`](Self::lane).
+    fn log_likelihood(&self, i: usize) -> Option<f64> {
+        self.lane(i).map(|lane| self.log_likelihoods.0[lane])
+    }
 }
 
 impl Kalman<'_> {
@@ -44,6 +53,37 @@ impl Kalman<'_> {
             && self.channels == 1
             && self.settings.method == Method::Points
             && !self.twin.has_events()
+    }
+
+    /// log p(y | θ) of several θ, in nats, on all cores; `None` where the filter does not work. Filters of few states run side by side.
+    ///
+    /// # Errors
+    ///
+    /// As [`log_likelihood`](Self::log_likelihood), where another θ would not help.
+    pub(crate) fn log_likelihoods(
+        &self,
+        thetas: &[Vec<f64>],
+    ) -> Result<Vec<Option<f64>>, FilterError> {
+        let alone = |theta: &Vec<f64>| recoverable(self.log_likelihood(theta));
+        if !self.fits_lanes() {
+            return thetas.par_iter().map(alone).collect();
+        }
+        let some = |thetas: &[Vec<f64>]| -> Result<Vec<Option<f64>>, FilterError> {
+            let all: Vec<_> = thetas.iter().map(|theta| (self, &theta[..])).collect();
+            let lanes = match all.len() {
+                0..=TOO_FEW => None,
+                _ => together(&all),
+            };
+            let of_lane = |i| lanes.as_ref().and_then(|lanes| lanes.log_likelihood(i));
+            (thetas.iter().enumerate())
+                .map(|(i, theta)| of_lane(i).map_or_else(|| alone(theta), |value| Ok(Some(value))))
+                .collect()
+        };
+        let each: Vec<Vec<Option<f64>>> = thetas
+            .par_chunks(LANES)
+            .map(some)
+            .collect::<Result<_, _>>()?;
+        Ok(each.concat())
     }
 
     /// Returns whether lanes can hold this filter beside another: of one twin that begins at the first row, with as many rows, the same ones
