@@ -10,7 +10,7 @@ use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior
 use super::problem::Problem;
 use super::profile::{Profile, ProfilesOf, profiles};
 use super::searched::Searched;
-use super::starts::polish;
+use super::starts::{agreed, agreeing, polish};
 use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, Measured};
@@ -43,7 +43,7 @@ pub(crate) fn run(
     let asked = (settings.draws > 0).then_some(settings.draws);
     let draws = match problem.is_simulated() && asked.is_none() {
         true => PosteriorSample::default(),
-        false => drawn(&problem, &mut fits, asked, noise.child("posterior"))?,
+        false => drawn(&problem, &mut fits, asked, noise)?,
     };
     let Some((fitted, certificate)) =
         (fits.first().cloned()).zip(Certificate::new(&problem, &fits))
@@ -145,9 +145,29 @@ fn stated(
     profiles
 }
 
+/// Posterior draws; where they lead to a better top that no other search has found, more of these begin.
+fn drawn(
+    problem: &Problem,
+    fits: &mut Vec<Fitted>,
+    asked: Option<usize>,
+    noise: Noise,
+) -> Result<PosteriorSample, FilterError> {
+    let draws = followed(problem, fits, asked, noise.child("posterior"))?;
+    if problem.is_simulated() || agreeing(fits) > 1 {
+        return Ok(draws);
+    }
+    let best = fits.first().map(|fit| fit.objective);
+    let more = noise.child("more searches");
+    *fits = agreed(problem, std::mem::take(fits), more, ITERATIONS)?;
+    match fits.first().map(|fit| fit.objective) > best {
+        true => followed(problem, fits, asked, noise.child("posterior")),
+        false => Ok(draws),
+    }
+}
+
 /// Posterior draws; where one of them is better than the best fit, another search begins there: the likelihood has kinks that no slope
 /// leads over.
-fn drawn(
+fn followed(
     problem: &Problem,
     fits: &mut Vec<Fitted>,
     asked: Option<usize>,

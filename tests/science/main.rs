@@ -21,6 +21,7 @@ mod misspecification;
 mod noise;
 mod numbers;
 mod records;
+mod searches;
 mod steps;
 mod suitability;
 

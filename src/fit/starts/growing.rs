@@ -1,15 +1,44 @@
-//! The first fit of a black box: on the beginning of the records, then on more of them, then on all.
+//! Starts from fits to the beginning of the records, then to more of them.
 //!
-//! Runs do not follow a record, they start with it: at a wrong θ a run of an oscillator is soon in another phase, and the
-//! likelihood of a whole record has a top for each cycle that is lost. Over the first quarter of a record there is one.
+//! A black box, or equations without process noise, does not follow a record, it starts with it: at a wrong θ a run of an oscillator is soon in
+//! another phase, and the likelihood of a whole record has a top for each cycle that is lost. Over the first quarter of a record there is one.
 
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
-use crate::fit::starts::climbs;
+use crate::fit::starts::{Screen, climbs, screened};
 use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::twin::Noise;
+
+/// The same twin on the beginning of each record.
+fn begun(problem: &Problem, share: f64) -> Problem {
+    let part = |r: &Record| {
+        let part = r.first_part(((share * r.samples() as f64) as usize).max(1));
+        part.unwrap_or_else(|| r.clone())
+    };
+    problem.on(problem.records.iter().map(part).collect::<Vec<_>>())
+}
+
+/// Random starts that fits to the beginning of the records have moved.
+pub(super) fn grown(
+    problem: &Problem,
+    noise: Noise,
+    iterations: usize,
+) -> Result<Vec<Vec<f64>>, FilterError> {
+    let mut starts = vec![];
+    for (level, share) in BUDGET.grown_shares.into_iter().enumerate() {
+        let short = begun(problem, share);
+        if level == 0 {
+            starts = screened(&short, noise.child("loud"), Screen::LOUD_APART)?;
+            let quiet = Screen::quiet(&short);
+            starts.extend(screened(&short, noise.child("quiet"), quiet)?);
+        }
+        let fits = climbs(&short, &starts, iterations)?;
+        starts = fits.into_iter().map(|fit| fit.theta).collect();
+    }
+    Ok(starts)
+}
 
 /// The best θ of all starts; `None` where the twin can be simulated at none.
 pub(crate) fn base_fit(
@@ -32,13 +61,7 @@ pub(crate) fn base_fit(
         .chain(initial.clone())
         .collect();
     for (level, share) in BUDGET.grown_shares.into_iter().enumerate() {
-        let begun: Vec<Record> = (problem.records.iter())
-            .map(|r| {
-                let part = r.first_part(((share * r.samples() as f64) as usize).max(1));
-                part.unwrap_or_else(|| r.clone())
-            })
-            .collect();
-        let short = problem.on(begun);
+        let short = begun(problem, share);
         if level == 0 {
             let values = short.log_posteriors(&starts)?;
             let mut all: Vec<(f64, Vec<f64>)> = (values.into_iter().zip(starts))

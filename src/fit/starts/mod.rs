@@ -1,9 +1,10 @@
-//! Searches for the most probable θ, and where they begin: from drawn points, at the poles of a record (`spectral`), and of black boxes
-//! (`growing`).
+//! Searches for the most probable θ, and where they begin: at drawn points, at the poles of a record (`spectral`), and where fits to its
+//! beginning end (`growing`).
 
 pub(crate) mod growing;
 mod spectral;
 
+use growing::grown;
 pub(crate) use spectral::spectral_starts;
 
 use crate::fit::budget::{BUDGET, ITERATIONS};
@@ -40,12 +41,12 @@ pub(crate) fn search(
     iterations: usize,
     care: Care,
 ) -> Result<Vec<Fitted>, FilterError> {
-    let (loud, quiet, again) = match care {
-        Care::Loud => (Screen::LOUD, vec![], 0),
+    let (loud, quiet) = match care {
+        Care::Loud => (Screen::LOUD, vec![]),
         Care::Thorough => {
             let noise = noise.child("quiet starts");
             let quiet = screened(problem, noise, Screen::quiet(problem))?;
-            (Screen::LOUD_APART, quiet, BUDGET.more_starts)
+            (Screen::LOUD_APART, quiet)
         }
     };
     let starts: Vec<Vec<f64>> = [problem.begin(&problem.centre())]
@@ -54,13 +55,25 @@ pub(crate) fn search(
         .chain(screened(problem, noise.child("starts"), loud)?)
         .chain(quiet)
         .collect();
-    let mut fits = polish(problem, climbs(problem, &starts, iterations)?, iterations)?;
-    for round in 0..again {
+    let fits = polish(problem, climbs(problem, &starts, iterations)?, iterations)?;
+    match care {
+        Care::Loud => Ok(fits),
+        Care::Thorough => agreed(problem, fits, noise.child("more starts"), iterations),
+    }
+}
+
+/// Searches from more starts while only one has ended at the best top.
+pub(super) fn agreed(
+    problem: &Problem,
+    mut fits: Vec<Fitted>,
+    noise: Noise,
+    iterations: usize,
+) -> Result<Vec<Fitted>, FilterError> {
+    for round in 0..BUDGET.more_starts {
         if agreeing(&fits) > 1 {
             break;
         }
-        let noise = noise.child("more starts").sample(round);
-        let starts = screened(problem, noise, Screen::LOUD_APART)?;
+        let starts = grown(problem, noise.sample(round), iterations)?;
         fits.extend(climbs(problem, &starts, iterations)?);
         sort(&mut fits);
         fits = polish(problem, fits, iterations)?;

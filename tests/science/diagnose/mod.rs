@@ -272,6 +272,41 @@ fn what_parameters_absorb_is_no_structural_gap() {
     );
 }
 
+/// An effect that would explain a parameter gap as well is listed with its own probability, and only where it is more probable than nothing
+/// beside parameters inside the prior. A ceiling is much like other valves.
+#[test]
+fn what_absorbs_a_parameter_gap_is_no_more_probable_than_all_that_is_listed() {
+    let study = study("tanks");
+    let effect = "[[effect]]\nid = 'state-ceiling'\ntarget = 'h1'\nto = 'h2'\nmagnitudes = { level = 5.0, spill = 0.0 }\n";
+    let theta = [0.6, 0.5, 0.55, 1.0];
+    let mut absorbed = 0;
+    for seed in 60..66 {
+        let noise = Noise::new(seed, "parameter-gap", 0);
+        let record = record(study.twin(), effect, &theta, drive(&study, noise), noise);
+        let settings = DiagnoseSettings {
+            quick: true,
+            ..DiagnoseSettings::default()
+        };
+        let found = diagnose(&study, &[record], None, &settings, &Progress::silent());
+        let cause = found.unwrap().cause;
+        let listed = cause.probabilities.listed + cause.probabilities.partial;
+        for effect in &cause.effects {
+            assert!(
+                effect.probability <= listed + 1e-9,
+                "seed {seed}: {cause:?}"
+            );
+        }
+        if cause.decision == Decision::Absorbed {
+            absorbed += 1;
+            assert!(
+                cause.effects.iter().all(|e| e.log_evidence > 0.0),
+                "seed {seed}"
+            );
+        }
+    }
+    assert!(absorbed > 0, "no record has a parameter gap with a rival");
+}
+
 /// A force that nobody listed is detected, and no effect is named for it. `memory::a_response_to_the_own_cycle_is_no_wave` asks the same of
 /// another.
 #[test]

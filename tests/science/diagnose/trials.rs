@@ -63,7 +63,13 @@ pub fn drive(study: &Study, noise: Noise) -> Drive {
 }
 
 /// A record of `twin` with the effects of a text.
-pub fn record(twin: &Twin, effects: &str, theta: &[f64], drive: Drive, noise: Noise) -> Record {
+pub(crate) fn record(
+    twin: &Twin,
+    effects: &str,
+    theta: &[f64],
+    drive: Drive,
+    noise: Noise,
+) -> Record {
     let effects = Catalogue::default().parse(effects).unwrap();
     let given: BTreeMap<_, _> = effects
         .iter()
