@@ -1,6 +1,6 @@
 //! Linear twins with normal noise, for which the filter is exact.
 
-use super::{FilterError, FilterSettings, Kalman, Method, Score};
+use super::{Coordinates, FilterError, FilterSettings, Kalman, Method, Score};
 use crate::record::*;
 use crate::twin::*;
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
@@ -412,4 +412,68 @@ fn what_does_not_fit_is_named() {
         .and_then(|k| k.log_likelihood(&[1e200, 0.0]))
         .unwrap_err();
     assert!(error.is_recoverable(), "{error}");
+}
+
+/// A clock whose phase is read over sixty periods, by equations that are exact to a millionth: its frequency is told to the half step of a one-sided
+/// difference, which must not move the top.
+#[test]
+fn one_sided_scores_vanish_at_a_sharp_top() {
+    #[derive(Clone)]
+    struct Clock;
+    impl StateSpace for Clock {
+        fn outline(&self) -> Outline {
+            Outline {
+                parameters: ParameterSpace::new([
+                    Parameter::new("w", "rad/s", 5.0, 20.0),
+                    Parameter::new("decay", "1/s", 0.001, 0.1),
+                ]),
+                states: vec![Quantity::new("x", "m"), Quantity::new("v", "m/s")],
+                outputs: vec![Quantity::new("y", "m")],
+                ..Outline::new()
+            }
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            let [w, decay] = [now.theta[0], now.theta[1]];
+            (dx[0], dx[1]) = (x[1], -w * w * x[0] - decay * x[1]);
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+            x.copy_from_slice(&[1.0, 0.0]);
+        }
+        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
+            measurement[0] = 0.01;
+        }
+        fn integrator(&self) -> Integrator {
+            Integrator::RungeKutta4
+        }
+        fn stepping(&self) -> Stepping {
+            Stepping {
+                substeps: 8,
+                ..Stepping::default()
+            }
+        }
+    }
+    let theta = [10.0, 0.01];
+    let drive = Drive::autonomous(0.1, 400).unwrap();
+    let outputs = Clock
+        .simulate(&theta, &drive, Noise::new(1, "clock", 0))
+        .unwrap();
+    let record = Record::new(drive, outputs).unwrap();
+    let kalman = Kalman::new(Clock, &record, &FilterSettings::default()).unwrap();
+    let coordinates = Coordinates::new(kalman.parameters());
+    let log_likelihood = |h: f64| {
+        let there = [theta[0] * h.exp(), theta[1]];
+        kalman.log_likelihood(&there).unwrap()
+    };
+    let slope = (log_likelihood(1e-7) - log_likelihood(-1e-7)) / 2e-7;
+    let lanes = Score::forward(&kalman, &theta, &coordinates).unwrap();
+    let scalar = Score::forward_one_by_one(&kalman, &theta, &coordinates).unwrap();
+    for score in [&lanes, &scalar] {
+        let deviations = (score.gradient[0] - slope) / score.fisher[(0, 0)].sqrt();
+        assert!(deviations.abs() < 0.1, "{deviations}");
+    }
+    // A half step is most of a deviation here.
+    assert!(0.5e-5 * scalar.fisher[(0, 0)].sqrt() > 0.5);
 }

@@ -6,7 +6,7 @@ mod memory;
 mod share;
 mod study_of_many;
 mod swallowed;
-mod trials;
+pub(crate) mod trials;
 
 use crate::binomial_bounds;
 use std::path::Path;

@@ -81,8 +81,10 @@ impl Score {
     }
 
     /// As [`at`](Self::at), by one-sided differences with steps of a hundredth: d + 1 passes over the record instead of
-    /// 2·d + 1, the gradient off by half a step times the information. For searches, and for features. Small twins run
-    /// all passes side by side. Entries that the coordinates hold have zeros.
+    /// 2·d + 1. For searches, and for features. Small twins run all passes side by side. Entries that the coordinates hold have zeros.
+    ///
+    /// Such a difference is the slope half a step away. The information, which is the curvature where the twin is right, leads back: what is left
+    /// is the half step times what both differ by. Without this, a clock or a limit cycle that many periods tell ends 0.7 deviations from its top.
     ///
     /// # Errors
     ///
@@ -144,24 +146,35 @@ impl Score {
             let (back, behind) = coordinates.beside(&phi, j, -FORWARD);
             let is_central =
                 kalman.twin.has_events() && distance > 0.0 && back[j] >= coordinates.lower()[j];
-            let (other, way) = match is_central {
-                true => (&rows(&coordinates.theta(&back))?.1, distance - behind),
-                false => (&centre, distance),
+            let (other, behind) = match is_central {
+                true => (&rows(&coordinates.theta(&back))?.1, behind),
+                false => (&centre, 0.0),
             };
-            Ok((there - other) / way)
+            let slope = (there - other) / (distance - behind);
+            Ok((slope, 0.5 * (distance + behind)))
         };
         let free = coordinates.free();
         // Passes that wait for exchanges wait together.
-        let slopes: Result<Vec<DVector<f64>>, FilterError> = match kalman.twin.beside() {
+        let slopes: Result<Vec<(DVector<f64>, f64)>, FilterError> = match kalman.twin.beside() {
             1 => free.iter().map(|j| slope(*j)).collect(),
             _ => free.par_iter().map(|j| slope(*j)).collect(),
         };
         let slopes = slopes?;
         let mut jacobian = DMatrix::zeros(centre.len(), phi.len());
-        for (&j, slope) in free.iter().zip(&slopes) {
+        for (&j, (slope, _)) in free.iter().zip(&slopes) {
             jacobian.set_column(j, slope);
         }
-        Self::assemble(kalman, log_likelihood, &centre, &jacobian)
+        let found = Self::assemble(kalman, log_likelihood, &centre, &jacobian)?;
+        let middles = slopes.iter().map(|(_, middle)| *middle);
+        Ok(found.led_back(free.into_iter().zip(middles)))
+    }
+
+    /// Leads slopes, each taken at a distance along its entry, back to the centre.
+    fn led_back(mut self, middles: impl IntoIterator<Item = (usize, f64)>) -> Self {
+        for (j, distance) in middles {
+            self.gradient[j] += distance * self.fisher[(j, j)];
+        }
+        self
     }
 
     /// From derivatives of log-densities and of innovations and variances, both in standard deviations.
@@ -309,7 +322,8 @@ fn of_lanes(each: &[(&Together, usize)], moves: &[Move], d: usize) -> Score {
         }
     }
     let log_likelihood = centre.log_likelihoods.0[c];
-    Score::of_one_output(log_likelihood, &samples, [&shifts, &spreads])
+    let found = Score::of_one_output(log_likelihood, &samples, [&shifts, &spreads]);
+    found.led_back(moves.iter().map(|to| (to.entry, 0.5 * to.distance)))
 }
 
 /// ln, by its series where it is short.
