@@ -461,7 +461,8 @@ fn one_sided_scores_vanish_at_a_sharp_top() {
         .simulate(&theta, &drive, Noise::new(1, "clock", 0))
         .unwrap();
     let record = Record::new(drive, outputs).unwrap();
-    let kalman = Kalman::new(Clock, &record, &FilterSettings::default()).unwrap();
+    let settings = FilterSettings::default();
+    let kalman = Kalman::new(Clock, &record, &settings).unwrap();
     let coordinates = Coordinates::new(kalman.parameters());
     let log_likelihood = |h: f64| {
         let there = [theta[0] * h.exp(), theta[1]];
