@@ -1,10 +1,12 @@
 //! Searches for the most probable θ, and where they begin: at drawn points, at the poles of a record (`spectral`), and where fits to its
-//! beginning end (`growing`).
+//! beginning end (`growing`), and at tops along the axes through the best one (`scan`).
 
 pub(crate) mod growing;
+mod scan;
 mod spectral;
 
 use growing::grown;
+use scan::scanned;
 pub(crate) use spectral::spectral_starts;
 
 use crate::fit::budget::{BUDGET, ITERATIONS};
@@ -58,7 +60,10 @@ pub(crate) fn search(
     let fits = polish(problem, climbs(problem, &starts, iterations)?, iterations)?;
     match care {
         Care::Loud => Ok(fits),
-        Care::Thorough => agreed(problem, fits, noise.child("more starts"), iterations),
+        Care::Thorough => {
+            let fits = scanned(problem, fits, iterations)?;
+            agreed(problem, fits, noise.child("more starts"), iterations)
+        }
     }
 }
 
