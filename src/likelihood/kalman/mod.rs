@@ -40,7 +40,6 @@
 //! a mixture, rounding its mean over a cell; what follows from either for the
 //! state is again a mean and a covariance.
 
-mod beside;
 mod coordinates;
 mod error;
 mod filter;

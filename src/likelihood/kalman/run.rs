@@ -1,4 +1,6 @@
-//! Runs of a filter at one θ.
+//! Runs of a filter at one θ, or at several side by side.
+
+mod beside;
 
 use super::normal::clip::clip;
 use super::order::Order;
@@ -7,6 +9,8 @@ use super::size::{Any, with_size};
 use super::start::spread_start;
 use super::{FilterError, Kalman};
 use crate::twin::{Acting, Now};
+
+pub(super) use beside::{Together, together};
 
 impl Kalman<'_> {
     /// The record's drive as the twin sees it at θ, which is checked.

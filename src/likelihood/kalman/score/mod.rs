@@ -2,9 +2,9 @@
 
 mod response;
 
-use super::beside::{Together, together};
 use super::order::Order;
 use super::pass::{Innovation, Sink};
+use super::run::{Together, together};
 use super::{Coordinates, FilterError, Kalman};
 use crate::math::{LANES, Stencil};
 use nalgebra::{DMatrix, DMatrixView, DVector};

@@ -3,11 +3,11 @@
 //! Each number of the recursion is eight numbers ([`Lanes`]), one for each θ, which the processor handles together. The twin's equations stay
 //! plain f64 and are called for one lane after the other.
 
-use super::order::Order;
-use super::pass::{FilterJob, Innovation, Pass, Sink};
-use super::size::{Size, with_size};
-use super::update::Readings;
-use super::{FilterError, Kalman, Method, recoverable};
+use crate::likelihood::kalman::order::Order;
+use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
+use crate::likelihood::kalman::size::{Size, with_size};
+use crate::likelihood::kalman::update::Readings;
+use crate::likelihood::kalman::{FilterError, Kalman, Method, recoverable};
 use crate::math::{Kernel, LANES, Lanes, widest};
 use crate::twin::MOST_STATES;
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 const TOO_FEW: usize = 2;
 
 /// Innovation and its variance, row by row; 0 and 1 where the output is missing.
-pub(super) type LaneRows = Vec<[Lanes; 2]>;
+pub(in crate::likelihood::kalman) type LaneRows = Vec<[Lanes; 2]>;
 
 impl Sink<Lanes> for LaneRows {
     #[inline(always)]
@@ -26,7 +26,7 @@ impl Sink<Lanes> for LaneRows {
 }
 
 /// Rows of up to eight filters run side by side.
-pub(super) struct Together {
+pub(in crate::likelihood::kalman) struct Together {
     /// Lane of each filter that was asked for.
     lanes: Vec<Option<usize>>,
     /// log p(y | θ) of each lane, in nats.
@@ -88,7 +88,7 @@ impl Kalman<'_> {
 
     /// Returns whether lanes can hold this filter beside another: of one twin that begins at the first row, with as many rows, the same ones
     /// missing, and no replicates.
-    pub(super) fn fits_beside(&self, other: &Self) -> bool {
+    pub(in crate::likelihood::kalman) fn fits_beside(&self, other: &Self) -> bool {
         let is_same = std::ptr::eq(self, other);
         is_same
             || self.twin.is(&other.twin)
@@ -101,7 +101,7 @@ impl Kalman<'_> {
 }
 
 /// Runs up to eight filters that fit beside each other, each at a θ, side by side; `None` where all have to be run one by one.
-pub(super) fn together(all: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
+pub(in crate::likelihood::kalman) fn together(all: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
     let (first, _) = all.first()?;
     if !first.fits_lanes() {
         return None;
