@@ -132,8 +132,8 @@ impl GateTest<'_> {
         })
     }
 
-    /// The test again after θ was refitted to the record with features x: columns of the Jacobian ∂f̄/∂θ (n × d), which
-    /// the refit has used up, are projected out of the record's whitened residual and of the null's alike
+    /// The test again after θ was refitted to the record with features x: columns of the Jacobian of f̄ by θ over the prior's widths (n × d),
+    /// which the refit has used up, are projected out of the record's whitened residual and of the null's alike
     /// (Sargan–Hansen, n − d degrees of freedom). `None` where no degree of freedom is left.
     ///
     /// The Jacobian may be that of a point nearby: only its column space matters.

@@ -1,7 +1,7 @@
 //! From features to parameters: the network, and what stands around it.
 
 use crate::estimator::budget::BUDGET;
-use crate::math::{MathError, Whitening, nearest, quantile, to_array, to_matrix};
+use crate::math::{MathError, Whitening, nearest, norm, quantile, to_array, to_matrix, unit};
 use crate::network::{Network, NetworkError};
 use crate::twin::ParameterSpace;
 use ndarray::{Array1, Array2, Axis, aview1, concatenate};
@@ -54,11 +54,13 @@ impl Scaler {
     pub fn fit(samples: &Array2<f64>) -> Self {
         let columns = samples.columns().into_iter().map(|column| {
             let size = column.fold(0.0, |a: f64, v| a.max(v.abs()));
-            let deviation = column.std(0.0);
+            let unit = unit(size);
+            let column = column.mapv(|v| v / unit);
+            let deviation = column.std(0.0) * unit;
             // Rounding of the mean must not be blown up to unit size.
             let varies = deviation > 1e-12 * size;
             let scale = if varies { deviation } else { 1.0 };
-            (column.mean().unwrap_or(0.0), scale)
+            (column.mean().unwrap_or(0.0) * unit, scale)
         });
         let (mean, scale) = columns.unzip();
         Self { mean, scale }
@@ -324,8 +326,7 @@ impl Calibration {
             let errors: Vec<f64> = (nearest.iter())
                 .map(|&i| self.truth[[i, j]] - self.predicted[[i, j]])
                 .collect();
-            let square = errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64;
-            std_error.push(square.sqrt());
+            std_error.push(norm(&errors) / (errors.len().max(1) as f64).sqrt());
             let tail = tail(errors.len(), 0.5 - 0.5 * INTERVAL_LEVEL);
             ends[0].push(quantile(&errors, tail).ok()?);
             ends[1].push(quantile(&errors, 1.0 - tail).ok()?);
@@ -425,17 +426,22 @@ mod tests {
 
     #[test]
     fn there_and_back_with_a_constant_column() {
-        let samples = Array2::from_shape_fn((9, 3), |(i, j)| match j {
+        let samples = Array2::from_shape_fn((9, 5), |(i, j)| match j {
             0 => i as f64,
             1 => 0.1,
-            _ => 1e-9 * (i as f64).sin(),
+            2 => 1e-9 * (i as f64).sin(),
+            3 => 1e200 * (i as f64).sin(),
+            _ => 1e-200 * (i as f64).sin(),
         });
         let scaler = Scaler::fit(&samples);
         let z = scaler.apply(&samples);
         assert!(z.column(1).iter().all(|v| v.abs() < 1e-12));
-        assert!((z.column(2).std(0.0) - 1.0).abs() < 1e-9);
+        for j in 2..5 {
+            assert!((z.column(j).std(0.0) - 1.0).abs() < 1e-9, "column {j}");
+        }
         let back = scaler.invert(&z);
-        assert!((&back - &samples).iter().all(|d| d.abs() < 1e-15));
+        let off = (&back - &samples) / &aview1(&scaler.scale);
+        assert!(off.iter().all(|d| d.abs() < 1e-14));
     }
 
     /// Two features that differ by a thousandth of their size, a third in another unit, a fourth constant.

@@ -81,9 +81,10 @@ impl Stencil {
                     stencil.points.len() - 1
                 });
                 vec![
-                    (centre, -(a + b) / (a * b)),
-                    (near, b / (a * (b - a))),
-                    (far, -a / (b * (b - a))),
+                    // No product of two distances: that of small ones is zero.
+                    (centre, -(1.0 / a + 1.0 / b)),
+                    (near, b / (b - a) / a),
+                    (far, -a / (b - a) / b),
                 ]
             };
             if column.iter().any(|(_, weight)| !weight.is_finite()) {

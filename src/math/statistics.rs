@@ -10,6 +10,22 @@ pub(crate) fn deviation(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
+/// The power of two at or below a size: squares of values divided by it neither overflow nor vanish, and no bit of them is lost. 1 for
+/// sizes that are 0, subnormal or not finite.
+pub(crate) fn unit(size: f64) -> f64 {
+    match size.is_normal() {
+        true => f64::from_bits(size.to_bits() & f64::INFINITY.to_bits()),
+        false => 1.0,
+    }
+}
+
+/// √Σv², of values of any size.
+pub(crate) fn norm(values: &[f64]) -> f64 {
+    let unit = unit(largest(values));
+    let square: f64 = values.iter().map(|v| (v / unit).powi(2)).sum();
+    square.sqrt() * unit
+}
+
 /// Largest absolute value; 0 of none.
 pub(crate) fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |a: f64, v| a.max(v.abs()))
@@ -245,6 +261,21 @@ mod tests {
         fn known_correlations() {
             assert_eq!(correlation(&[(1.0, 2.0), (2.0, 4.0), (3.0, 6.0)]), 1.0);
             assert_eq!(correlation(&[(1.0, 2.0), (1.0, 4.0)]), 0.0);
+        }
+    }
+
+    mod sizes {
+        use super::super::*;
+
+        /// Sizes whose squares overflow or vanish are as good as any.
+        #[test]
+        fn a_norm_has_the_unit_of_its_values() {
+            for size in [1.0, 1e-160, 1e-300, 1e160, 1e300] {
+                let norm = norm(&[3.0 * size, -4.0 * size]);
+                assert!((norm / (5.0 * size) - 1.0).abs() < 1e-12, "{size:e}");
+            }
+            assert_eq!((norm(&[]), norm(&[0.0])), (0.0, 0.0));
+            assert_eq!((unit(5.0), unit(0.3), unit(0.0)), (4.0, 0.25, 1.0));
         }
     }
 

@@ -1,5 +1,6 @@
 use super::MathError;
 use super::convert::to_matrix;
+use super::statistics::norm;
 use nalgebra::{DMatrix, DVector};
 use ndarray::ArrayRef2;
 
@@ -53,7 +54,7 @@ impl Whitening {
         };
         let (kept, deviations): (Vec<usize>, Vec<f64>) = centred
             .column_iter()
-            .map(|column| column.norm())
+            .map(|column| norm(column.as_slice()))
             .enumerate()
             .filter(varying)
             .unzip();
@@ -228,7 +229,7 @@ mod tests {
             let column = &harsh.slice(s![.., j - 1]) + &(&samples.slice(s![.., j]) * 1e-6);
             harsh.column_mut(j).assign(&column);
         }
-        for (j, unit) in [1e-9, 1.0, 1e9, 1e-3, 1e4].into_iter().enumerate() {
+        for (j, unit) in [1e-9, 1.0, 1e200, 1e-200, 1e4].into_iter().enumerate() {
             harsh.column_mut(j).mapv_inplace(|v| v * unit);
         }
         let whitening = Whitening::calibrated(&harsh).unwrap();

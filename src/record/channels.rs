@@ -6,6 +6,10 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
+/// Largest size of a channel; its inverse is the least one that is not 0. Squares and sums of squares of a record must stay finite and must
+/// not vanish: twice or half of it are as good, 1e154 is not.
+pub(crate) const LARGEST: f64 = 1e100;
+
 /// A named physical quantity with its unit.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Quantity {

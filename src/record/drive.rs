@@ -1,6 +1,8 @@
 //! The time grid and the inputs of one experiment.
 
-use crate::record::RecordError;
+use super::channels::LARGEST;
+use crate::math::three_digits;
+use crate::record::{Quantity, RecordError};
 use ndarray::{Array2, s};
 use std::sync::Arc;
 
@@ -331,6 +333,26 @@ pub(super) fn check_values(
             value,
         }),
     }
+}
+
+/// Checks that the channels of a signal have sizes that can be computed with.
+pub(crate) fn check_sizes(
+    signal: &Signal,
+    kind: &'static str,
+    quantities: &[Quantity],
+) -> Result<(), RecordError> {
+    for (channel, values) in signal.columns().into_iter().enumerate() {
+        let size = values.fold(0.0, |a: f64, v| a.max(v.abs()));
+        if size > LARGEST || (size > 0.0 && size < 1.0 / LARGEST) {
+            let name = quantities.get(channel).map(|own| own.name.clone());
+            return Err(RecordError::Size {
+                kind,
+                name: name.unwrap_or_else(|| (channel + 1).to_string()),
+                size: three_digits(size),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// A signal of one slice a channel.

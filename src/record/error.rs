@@ -1,5 +1,6 @@
 //! Errors of drives, records and their files.
 
+use super::channels::LARGEST;
 use crate::setting::number;
 use crate::storage::files::with_remedy;
 use crate::storage::untrusted::excerpt;
@@ -105,6 +106,20 @@ pub enum RecordError {
         sample: usize,
         /// The value.
         value: f64,
+    },
+    /// A channel whose squares overflow or vanish.
+    #[error(
+        "the largest value of {kind} {name} is {}; choose a unit in which it lies between {:e} and {LARGEST:e}",
+        number(*size),
+        1.0 / LARGEST
+    )]
+    Size {
+        /// "input" or "output".
+        kind: &'static str,
+        /// Channel.
+        name: String,
+        /// Its largest absolute value.
+        size: f64,
     },
     /// Channels other than the twin's.
     #[error(

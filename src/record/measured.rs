@@ -1,7 +1,7 @@
 //! A measured experiment.
 
 use super::channels::{column_names, columns};
-use super::drive::{check_values, signal};
+use super::drive::{check_sizes, check_values, signal};
 use crate::math::six_digits;
 use crate::record::{Drive, Quantity, RecordError, Signal, Signals, step_of};
 use ndarray::{ArrayView2, s};
@@ -196,14 +196,18 @@ impl Record {
         outputs
     }
 
-    /// Checks that a twin with these channels can be compared with the record.
+    /// Checks that a twin with these channels can be compared with the record, and that its numbers can be computed with: the largest value
+    /// of a channel lies between 1e-100 and 1e100, or is 0.
     pub fn check_channels(&self, signals: &Signals) -> Result<(), RecordError> {
         let (inputs, outputs) = (signals.inputs.len(), signals.outputs.len());
         let own = (self.drive.inputs().ncols(), self.outputs.ncols());
         let (kind, letter, given, expected) = match own {
             (given, _) if given != inputs => ("inputs", "u", given, inputs),
             (_, given) if given != outputs => ("outputs", "y", given, outputs),
-            _ => return Ok(()),
+            _ => {
+                check_sizes(self.drive.inputs(), "input", &signals.inputs)?;
+                return check_sizes(&self.outputs, "output", &signals.outputs);
+            }
         };
         let columns = columns(inputs, outputs).join(",");
         Err(RecordError::Channels {

@@ -18,10 +18,11 @@ mod stamp;
 mod table;
 mod text;
 
-pub(crate) use channels::{Columns, column_names};
+pub(crate) use channels::{Columns, LARGEST, column_names};
 pub use channels::{Quantity, Signals};
 pub(crate) use csv::{RecordReader, drive_csv_text, parse_record, record_csv_text, twin_csv_text};
 pub(crate) use drive::UNIFORM;
+pub(crate) use drive::check_sizes;
 pub use drive::{Drive, Signal};
 pub use error::RecordError;
 pub use measured::Record;

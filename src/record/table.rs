@@ -4,7 +4,7 @@ use super::channels::{Wanted, column_names, columns, is_usual};
 use super::drive::FileLines;
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};
-use crate::record::{Drive, Record, RecordError, Signal};
+use crate::record::{Drive, LARGEST, Record, RecordError, Signal};
 use crate::setting::number;
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt, quoted};
 use std::path::Path;
@@ -13,8 +13,6 @@ use std::path::Path;
 pub(crate) const MOST_SAMPLES: usize = 50_000_000;
 /// Most columns: t and a thousand inputs and outputs each.
 const MOST_COLUMNS: usize = 2001;
-/// Largest measured value: squares and sums of squares of a record must stay finite.
-const LARGEST: f64 = 1e100;
 
 /// The numbers of a file.
 pub(super) struct Table {

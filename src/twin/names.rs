@@ -1,7 +1,7 @@
 //! Names that files, the command line and effects can tell apart.
 
 use super::parameter::check_unique;
-use crate::record::Quantity;
+use crate::record::{Drive, Quantity, Signal};
 use crate::twin::{Outline, Parameter, Role, Twin, TwinError};
 
 /// Characters with a meaning in names that are put together: `start.h1`, `id@target.magnitude`, `disturbance/0`.
@@ -14,13 +14,37 @@ pub(crate) fn check_twin(twin: &Twin) -> Result<(), TwinError> {
     let parameters = twin.parameters();
     parameters.check()?;
     match twin.outline() {
-        Some(outline) => check_outline(&outline),
+        Some(outline) => {
+            check_outline(&outline)?;
+            check_noise(twin, &outline)
+        }
         None => {
             let signals = twin.signals();
             check_unique("input", names(&signals.inputs))?;
             check_unique("output", names(&signals.outputs))?;
             parameters.iter().try_for_each(check_composed)
         }
+    }
+}
+
+/// Checks the noise levels of a twin at the centre of its prior and its start.
+fn check_noise(twin: &Twin, outline: &Outline) -> Result<(), TwinError> {
+    let centre = outline.parameters.centre();
+    // Levels may ask for the inputs: a few samples of zeros.
+    let inputs = Signal::zeros((2, outline.inputs.len()));
+    let levels = (Drive::new(1.0, inputs).ok()).and_then(|drive| twin.first_noise(&centre, &drive));
+    let [process, measurement] = levels.unwrap_or_default();
+    let of_states = names(&outline.states).zip(process);
+    let of_outputs = names(&outline.outputs).zip(measurement);
+    // A level that is not a number at once may be one along a run.
+    match of_states.chain(of_outputs).find(|(_, level)| *level < 0.0) {
+        None => Ok(()),
+        Some((name, value)) => Err(TwinError::Value {
+            table: "noise",
+            name: name.into(),
+            value,
+            remedy: "a noise level is a standard deviation: 0 or above",
+        }),
     }
 }
 
@@ -91,6 +115,7 @@ fn named(kind: &str, name: &str, problem: &str) -> TwinError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::twin::{Now, StateSpace};
 
     fn problem(outline: Outline) -> String {
         check_outline(&outline).unwrap_err().to_string()
@@ -124,6 +149,35 @@ mod tests {
             let error = problem(outline);
             assert!(error.contains(text), "{error}");
         }
+    }
+
+    /// A clock whose noise has this level.
+    struct Clock(f64);
+
+    impl StateSpace for Clock {
+        fn outline(&self) -> Outline {
+            let outline = Outline::new().parameter(Parameter::new("k", "", 0.0, 1.0));
+            outline.state("x", "s").output("y", "s")
+        }
+        fn drift(&self, now: &Now<'_>, _: &[f64], dx: &mut [f64]) {
+            dx[0] = now.theta[0];
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
+            measurement[0] = self.0;
+        }
+    }
+
+    #[test]
+    fn a_negative_noise_is_refused() {
+        assert_eq!(check_twin(&Twin::new(Clock(0.0))), Ok(()));
+        let error = check_twin(&Twin::new(Clock(-0.1))).unwrap_err().to_string();
+        assert!(
+            error.contains("noise y = -0.1; a noise level is"),
+            "{error}"
+        );
     }
 
     #[test]

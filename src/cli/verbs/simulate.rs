@@ -62,6 +62,7 @@ impl Verb for Simulate {
         let outputs = twin.simulate(&theta, &drive, noise)?;
         let record = Record::complete(drive, outputs)?;
         let signals = twin.signals();
+        record.check_channels(&signals)?;
         if let Some(out) = &self.out {
             record.write_for(out, &signals)?;
         }

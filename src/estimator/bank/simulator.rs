@@ -5,7 +5,7 @@ use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
 use crate::progress::Stage;
-use crate::record::{Drive, Record, Signal};
+use crate::record::{Drive, Record, Signal, check_sizes};
 use crate::twin::{Noise, Twin};
 use nalgebra::DVector;
 use ndarray::{Array2, aview1};
@@ -93,14 +93,19 @@ impl FeatureSimulator {
         &self,
         all: &[(&[f64], &Drive, Noise)],
     ) -> Vec<Result<Vec<f64>, EstimatorError>> {
+        let signals = self.twin.signals();
         let outputs: Vec<Result<Signal, EstimatorError>> = (all.iter())
             .map(|&(theta, drive, noise)| {
-                (self.twin.simulate(theta, drive, noise)).map_err(|error| {
-                    match error.costs_one_run() {
-                        true => EstimatorError::Rejected(error.to_string()),
-                        false => EstimatorError::Simulation(error),
-                    }
-                })
+                let outputs =
+                    self.twin.simulate(theta, drive, noise).map_err(|error| {
+                        match error.costs_one_run() {
+                            true => EstimatorError::Rejected(error.to_string()),
+                            false => EstimatorError::Simulation(error),
+                        }
+                    })?;
+                check_sizes(&outputs, "output", &signals.outputs)
+                    .map_err(|error| EstimatorError::Rejected(error.to_string()))?;
+                Ok(outputs)
             })
             .collect();
         let simulated: Vec<(&Drive, &Signal)> = (all.iter().zip(&outputs))

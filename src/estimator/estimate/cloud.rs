@@ -28,14 +28,18 @@ fn sampler(
     spread: f64,
 ) -> Result<Sampler, EstimatorError> {
     let centre = &refined.theta;
-    let ellipsoid = || ellipsoid(centre, &refined.information.matrix / spread.powi(2));
+    let widths = DVector::from_vec(space.widths());
+    let ellipsoid = || {
+        let information = &refined.information.matrix / spread.powi(2);
+        ellipsoid(centre, &widths, information)
+    };
     let sensitivity = || {
         let jacobian = refined.whitened_jacobian();
         let length = median(&refined.spread).unwrap_or(1.0) * refined.residual.norm();
         let radius = |(j, p): (usize, &Parameter)| {
             // An insensitive parameter gives an infinite radius.
             let sensitivity = jacobian.column(j).norm().max(f64::MIN_POSITIVE);
-            (length / sensitivity).min(0.5 * p.start_range().width())
+            (length / sensitivity * widths[j]).min(0.5 * p.start_range().width())
         };
         sensitivity(centre, space.iter().enumerate().map(radius).collect())
     };
@@ -44,6 +48,7 @@ fn sampler(
         CloudSampler::Sensitivity => sensitivity(),
         CloudSampler::Box => {
             let axes = principal_axes(refined.information.covariance.clone());
+            let axes = DMatrix::from_diagonal(&widths) * axes;
             in_box(centre.as_slice(), &axes, spread)
         }
         CloudSampler::Hybrid => {
@@ -56,24 +61,29 @@ fn sampler(
     })
 }
 
-/// Gaussian draws whose covariance is the inverse of an information matrix G = L Lᵀ (d × d, inverse square units):
+/// Gaussian draws whose covariance is the inverse of an information matrix G = L Lᵀ (d × d) of θ over its widths w:
 ///
 /// ```text
-/// θ = centre + L⁻ᵀ z,   z ~ N(0, I),   so that   Cov θ = G⁻¹
+/// θ = centre + w ⊙ L⁻ᵀ z,   z ~ N(0, I),   so that   Cov (θ ⊘ w) = G⁻¹
 /// ```
 ///
-/// `(θ − centre)ᵀ G (θ − centre)` follows χ² with d degrees of freedom.
-fn ellipsoid(centre: &DVector<f64>, information: DMatrix<f64>) -> Result<Sampler, EstimatorError> {
+/// `δᵀ G δ` of δ = (θ − centre) ⊘ w follows χ² with d degrees of freedom.
+fn ellipsoid(
+    centre: &DVector<f64>,
+    widths: &DVector<f64>,
+    information: DMatrix<f64>,
+) -> Result<Sampler, EstimatorError> {
     let singular = || MathError::fatal("the information is not positive definite");
     let factor = information.cholesky().ok_or_else(singular)?;
     // L⁻¹; a Cholesky factor has a positive diagonal.
     let identity = DMatrix::identity(centre.len(), centre.len());
     let inverse = factor.l_dirty().solve_lower_triangular(&identity);
     let (inverse, centre) = (inverse.ok_or_else(singular)?, centre.clone());
+    let widths = widths.clone();
     Ok(Box::new(move |_, noise| {
         let mut source = noise.source("ellipsoid");
         let z = DVector::from_fn(centre.len(), |_, _| source.normal());
-        &centre + inverse.tr_mul(&z)
+        &centre + inverse.tr_mul(&z).component_mul(&widths)
     }))
 }
 
@@ -169,9 +179,11 @@ mod tests {
             4000,
             DMatrix::from_row_slice(2, 2, &[50.0, -30.0, -30.0, 20.0]),
         );
-        let sampler = ellipsoid(&DVector::zeros(2), information.clone()).unwrap();
+        let widths = DVector::from_vec(vec![2.0, 1e-200]);
+        let sampler = ellipsoid(&DVector::zeros(2), &widths, information.clone()).unwrap();
         let mut distance: Vec<f64> = draws(&sampler, n)
-            .map(|theta| (theta.transpose() * &information * theta)[0])
+            .map(|theta| theta.component_div(&widths))
+            .map(|off| (off.transpose() * &information * off)[0])
             .collect();
         distance.sort_by(f64::total_cmp);
         let exact = ChiSquared::new(2.0).unwrap();

@@ -13,7 +13,7 @@ use crate::fit::posterior::PosteriorRegion;
 use crate::math::one_row;
 use crate::network::Training;
 use nalgebra::DVector;
-use ndarray::{Array2, Axis, s};
+use ndarray::{Array2, aview1, s};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
 
@@ -105,6 +105,7 @@ impl EstimateRun<'_> {
         observed: &DVector<f64>,
     ) -> Result<Tuned, EstimatorError> {
         let (settings, estimator) = (self.settings, self.estimator);
+        let space = estimator.study().twin().parameters();
         let size = (settings.cloud.draws(draws.theta.ncols())).min(draws.theta.nrows());
         let rows =
             |all: &Array2<f64>, from: usize, to: usize| all.slice(s![from..to, ..]).to_owned();
@@ -134,7 +135,7 @@ impl EstimateRun<'_> {
             None => y,
         };
         let training = Training {
-            target_weights: weights(refined, &targets),
+            target_weights: weights(refined, &targets, &space.widths()),
             ..settings.tuning.clone()
         };
         let (network, _) =
@@ -156,7 +157,6 @@ impl EstimateRun<'_> {
             layer,
             network,
         };
-        let space = estimator.study().twin().parameters();
         let record = one_row(observed.as_slice());
         let theta = space.clamp(&readout.predict(&record)?.row(0).to_vec());
         let calibration = Calibration {
@@ -198,17 +198,17 @@ fn is_likely(square: f64, freedom: usize) -> bool {
 
 /// Share of each column's variance that a prediction explains.
 fn explained(predicted: &Array2<f64>, truth: &Array2<f64>) -> Vec<f64> {
-    let errors = (predicted - truth).mapv(|e| e * e).sum_axis(Axis(0));
-    let all = truth.var_axis(Axis(0), 0.0) * truth.nrows() as f64;
-    (errors.iter().zip(all))
-        .map(|(error, all)| 1.0 - error / all)
+    let all = Scaler::fit(truth).scale;
+    let errors = (predicted - truth) / aview1(&all);
+    (errors.columns().into_iter())
+        .map(|errors| 1.0 - errors.dot(&errors) / truth.nrows() as f64)
         .collect()
 }
 
 /// w_j for standardised targets.
-fn weights(refined: &RefinedEstimate, targets: &Scaler) -> Vec<f64> {
-    let information: Vec<f64> = (targets.scale.iter().enumerate())
-        .map(|(j, scale)| refined.information.matrix[(j, j)] * scale * scale)
+fn weights(refined: &RefinedEstimate, targets: &Scaler, widths: &[f64]) -> Vec<f64> {
+    let information: Vec<f64> = (targets.scale.iter().zip(widths).enumerate())
+        .map(|(j, (scale, width))| refined.information.matrix[(j, j)] * (scale / width).powi(2))
         .collect();
     let total: f64 = information.iter().sum();
     let d = information.len() as f64;

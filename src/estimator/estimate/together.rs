@@ -73,10 +73,10 @@ fn shared(space: &ParameterSpace) -> Vec<usize> {
         .collect()
 }
 
-/// Inverse covariance of the shared entries: correlations are Gauss–Newton's, standard errors those of the answer.
-fn precision(estimate: &Estimate, shared: &[usize]) -> DMatrix<f64> {
+/// Inverse covariance of the shared entries over their widths: correlations are Gauss–Newton's, standard errors those of the answer.
+fn precision(estimate: &Estimate, shared: &[usize], widths: &DVector<f64>) -> DMatrix<f64> {
     let n = shared.len();
-    let error = |a: usize| estimate.std_error[shared[a]];
+    let error = |a: usize| estimate.std_error[shared[a]] / widths[a];
     let correlation = |a: usize, b: usize| match estimate.information() {
         Some(known) => {
             let at = |i: usize, j: usize| known.covariance[(shared[i], shared[j])];
@@ -94,9 +94,13 @@ fn precision(estimate: &Estimate, shared: &[usize]) -> DMatrix<f64> {
 fn together(records: Vec<Estimate>, space: &ParameterSpace) -> Together {
     let shared = shared(space);
     let n = shared.len();
-    let value = |estimate: &Estimate| DVector::from_fn(n, |a, _| estimate.theta[shared[a]]);
+    let own = ParameterSpace::new(shared.iter().map(|&j| space[j].clone()));
+    // Over the widths of the prior, whatever the units are.
+    let widths = DVector::from_vec(own.widths());
+    let value =
+        |estimate: &Estimate| DVector::from_fn(n, |a, _| estimate.theta[shared[a]] / widths[a]);
     let weighed: Vec<_> = (records.iter())
-        .map(|estimate| (value(estimate), precision(estimate, &shared)))
+        .map(|estimate| (value(estimate), precision(estimate, &shared, &widths)))
         .collect();
     let total = (weighed.iter()).fold(DMatrix::zeros(n, n), |sum, (_, p)| sum + p);
     let right = (weighed.iter()).fold(DVector::zeros(n), |sum, (theta, p)| sum + p * theta);
@@ -116,8 +120,9 @@ fn together(records: Vec<Estimate>, space: &ParameterSpace) -> Together {
         Ok(chi) if disagreement.is_finite() => chi.sf(disagreement),
         _ => 1.0,
     };
-    let std_error: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
-    let own = ParameterSpace::new(shared.iter().map(|&j| space[j].clone()));
+    let errors = covariance.map_diagonal(f64::sqrt).component_mul(&widths);
+    let theta = theta.component_mul(&widths);
+    let std_error = errors.as_slice().to_vec();
     let answer = PointEstimate::normal(theta.as_slice().to_vec(), std_error, &own);
     Together {
         names: own.names().into_iter().map(str::to_owned).collect(),

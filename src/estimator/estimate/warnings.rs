@@ -57,8 +57,9 @@ pub(super) fn warnings(
         let leaning: Vec<&str> = (space.iter().zip(&information.std_error))
             .filter(|(p, error)| {
                 let prior = PRIOR_DEVIATION * p.prior.width();
-                p.role == Role::Parameter
-                    && error.powi(2) > BUDGET.leaning * (error.powi(2) + prior.powi(2))
+                // e² > share·(e² + p²), of sizes whose squares may vanish.
+                let ratio = (prior / *error).powi(2);
+                p.role == Role::Parameter && 1.0 > BUDGET.leaning * (1.0 + ratio)
             })
             .map(|(p, _)| p.name.as_str())
             .collect();

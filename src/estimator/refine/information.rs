@@ -2,20 +2,21 @@
 
 use crate::estimator::error::EstimatorError;
 use crate::twin::{PRIOR_DEVIATION, ParameterSpace, Role, combination, oriented};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, SymmetricEigen};
 use serde::Serialize;
 
 /// Fisher information of the features, regularised: G = JᵀJ/(1 + 1/K) + λ·diag(1/width²).
 ///
-/// J (rank × d) is whitened; K seeds were averaged, which adds 1/K to the variance of the difference between mean and record.
+/// J (rank × d) is whitened; K seeds were averaged, which adds 1/K to the variance of the difference between mean and record. All is in
+/// units of the prior's widths: parameters of any size are inverted alike, and nothing depends on their units.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section IV-B.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct FeatureInformation {
-    /// G, d × d, inverse squared parameter units.
+    /// G, d × d, of θ over the prior's widths.
     pub matrix: DMatrix<f64>,
-    /// G⁻¹.
+    /// G⁻¹, of θ over the prior's widths.
     pub covariance: DMatrix<f64>,
     /// √diag(G⁻¹), in parameter units.
     pub std_error: Vec<f64>,
@@ -38,23 +39,24 @@ pub struct Direction {
 }
 
 impl FeatureInformation {
-    /// From the whitened Jacobian (rank × d, inverse parameter units), λ and K.
+    /// From the whitened Jacobian by θ over the prior's widths (rank × d), λ and K.
     pub fn new(
         jacobian: &DMatrix<f64>,
         space: &ParameterSpace,
         ridge: f64,
         seeds: usize,
     ) -> Result<Self, EstimatorError> {
-        let widths = DVector::from_vec(space.widths());
-        let d = space.len();
-        // In units of the prior's width, so that parameters of any scale are inverted alike.
-        let scaled = DMatrix::from_fn(jacobian.nrows(), d, |i, j| jacobian[(i, j)] * widths[j]);
-        let mut matrix = scaled.tr_mul(&scaled) / (1.0 + 1.0 / seeds as f64);
-        for j in 0..d {
+        let mut matrix = jacobian.tr_mul(jacobian) / (1.0 + 1.0 / seeds as f64);
+        for j in 0..space.len() {
             matrix[(j, j)] += ridge;
         }
         let covariance = matrix.clone().cholesky().map(|factor| factor.inverse());
         let Some(covariance) = covariance.filter(|c| c.iter().all(|v| v.is_finite())) else {
+            if matrix.iter().any(|v| !v.is_finite()) {
+                return Err(EstimatorError::Undetermined(
+                    "the features at the estimate change too fast with the parameters to compute with; shrink the prior, or choose other features".into(),
+                ));
+            }
             let flat = SymmetricEigen::new(matrix);
             let weakest = flat.eigenvalues.imin();
             let direction = flat.eigenvectors.column(weakest);
@@ -63,18 +65,15 @@ impl FeatureInformation {
                 "the features hold no information on {words} at the estimate; fix this parameter, or choose other features"
             )));
         };
-        let directions = directions(&covariance, space);
-        let unscale = |matrix: DMatrix<f64>, power: i32| {
-            DMatrix::from_fn(d, d, |i, j| {
-                matrix[(i, j)] * (widths[i] * widths[j]).powi(power)
-            })
-        };
-        let covariance = unscale(covariance, 1);
+        let widths = space.widths();
+        let errors = covariance.diagonal();
         Ok(Self {
-            matrix: unscale(matrix, -1),
-            std_error: covariance.diagonal().iter().map(|v| v.sqrt()).collect(),
+            std_error: (errors.iter().zip(widths))
+                .map(|(v, w)| v.sqrt() * w)
+                .collect(),
+            directions: directions(&covariance, space),
+            matrix,
             covariance,
-            directions,
         })
     }
 
@@ -125,13 +124,13 @@ mod tests {
     }
 
     /// Only a + b (in widths) is seen, and the start.
-    fn jacobian(scale: f64) -> DMatrix<f64> {
-        DMatrix::from_row_slice(2, 3, &[9.0 / scale, 4.5, 0.0, 0.0, 0.0, 5.0])
+    fn jacobian() -> DMatrix<f64> {
+        DMatrix::from_row_slice(2, 3, &[9.0, 9.0, 0.0, 0.0, 0.0, 5.0])
     }
 
     #[test]
     fn the_unseen_direction_is_weak_and_named() {
-        let found = FeatureInformation::new(&jacobian(1.0), &space(1.0), 0.01, 1).unwrap();
+        let found = FeatureInformation::new(&jacobian(), &space(1.0), 0.01, 1).unwrap();
         let weak: Vec<_> = found.weak().collect();
         assert_eq!(weak.len(), 1);
         assert_eq!(weak[0].combination, "0.71·a − 0.71·b");
@@ -144,9 +143,9 @@ mod tests {
     /// The unit of a parameter changes its standard error by that unit, and no direction.
     #[test]
     fn units_do_not_matter() {
-        let (one, tiny) = (1.0, 1e-9);
-        let a = FeatureInformation::new(&jacobian(one), &space(one), 0.01, 3).unwrap();
-        let b = FeatureInformation::new(&jacobian(tiny), &space(tiny), 0.01, 3).unwrap();
+        let (one, tiny) = (1.0, 1e-200);
+        let a = FeatureInformation::new(&jacobian(), &space(one), 0.01, 3).unwrap();
+        let b = FeatureInformation::new(&jacobian(), &space(tiny), 0.01, 3).unwrap();
         assert!((a.std_error[0] * tiny / b.std_error[0] - 1.0).abs() < 1e-9);
         assert!((a.directions[0].std_error - b.directions[0].std_error).abs() < 1e-9);
     }
@@ -165,7 +164,7 @@ mod tests {
 
     #[test]
     fn no_information_is_an_error_that_names_the_direction() {
-        let error = FeatureInformation::new(&jacobian(1.0), &space(1.0), 0.0, 1).unwrap_err();
+        let error = FeatureInformation::new(&jacobian(), &space(1.0), 0.0, 1).unwrap_err();
         assert!(error.to_string().contains("0.71·a − 0.71·b"), "{error}");
     }
 }

@@ -36,7 +36,7 @@ pub struct RefinedEstimate {
     pub whitening: Whitening,
     /// Whitened distances ‖S^{-1/2}(x_k − μ)‖ of the simulations there.
     pub spread: Vec<f64>,
-    /// ∂f̄/∂θ at θ_GN, n × d, features over parameters.
+    /// Derivatives of f̄ by θ over the prior's widths at θ_GN, n × d.
     pub jacobian: DMatrix<f64>,
     /// S^{-1/2}(f̄ − x_obs) at θ_GN.
     pub residual: DVector<f64>,
@@ -45,7 +45,7 @@ pub struct RefinedEstimate {
 }
 
 impl RefinedEstimate {
-    /// S^{-1/2} ∂f̄/∂θ, rank × d.
+    /// The whitened Jacobian by θ over the prior's widths, rank × d.
     pub fn whitened_jacobian(&self) -> DMatrix<f64> {
         self.whitening.apply_columns(&self.jacobian)
     }
@@ -244,7 +244,10 @@ impl Refinement<'_> {
             whitening,
             spread,
         } = local;
-        let jacobian = features.jacobian(&theta).map_err(not_evaluated)?;
+        let mut jacobian = features.jacobian(&theta).map_err(not_evaluated)?;
+        for (mut column, width) in jacobian.column_iter_mut().zip(&features.widths) {
+            column *= *width;
+        }
         let mean = features.at(theta.as_slice()).map_err(not_evaluated)?;
         let residual = whitening.apply(&(mean - self.observed));
         let information = FeatureInformation::new(

@@ -4,7 +4,7 @@ use super::resampling::PosteriorSample;
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
-use crate::math::{principal_axes, solve_truncated};
+use crate::math::{norm, principal_axes, solve_truncated};
 use crate::twin::Role;
 use nalgebra::{DMatrix, DVector};
 
@@ -13,8 +13,11 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) struct PosteriorRegion {
     /// Mean.
     pub theta: Vec<f64>,
-    /// Columns: principal axes of the covariance, one standard deviation long, in the units of θ.
+    /// Columns: one standard deviation long, in the units of θ; principal axes of the covariance of θ over the prior's widths, so that the
+    /// units change no direction.
     pub axes: DMatrix<f64>,
+    /// Widths of the prior.
+    widths: DVector<f64>,
 }
 
 impl PosteriorRegion {
@@ -34,42 +37,53 @@ impl PosteriorRegion {
         let least = BUDGET.least_share * draws.modes.len() as f64;
         let counts =
             |mode: usize| draws.modes.iter().filter(|m| **m == mode).count() as f64 >= least;
+        let space = problem.twin.parameters();
+        let widths = DVector::from_column_slice(&space.widths()[..own]);
+        let over_widths =
+            |theta: &[f64]| DVector::from_column_slice(&theta[..own]).component_div(&widths);
         let about: Vec<DVector<f64>> = (draws.thetas.iter().zip(&draws.modes))
             .filter(|(_, mode)| counts(**mode))
-            .map(|(theta, _)| DVector::from_column_slice(&theta[..own]))
+            .map(|(theta, _)| over_widths(theta))
             .collect();
         let (mut mean, mut covariance) = match about.len() >= BUDGET.region_draws * own {
             true => moments(&about),
-            false => first_order(problem, fitted, own),
+            false => (
+                over_widths(&fitted.theta),
+                first_order(problem, fitted, &widths),
+            ),
         };
-        let space = problem.twin.parameters();
         for (j, p) in space.iter().take(own).enumerate() {
             if p.role != Role::Start || !problem.axes[j].held {
                 continue;
             }
             if let Some((value, deviation)) = start(p.target()) {
-                mean[j] = p.bounds.clamp(value);
-                covariance[(j, j)] = deviation.powi(2);
+                mean[j] = p.bounds.clamp(value) / widths[j];
+                covariance[(j, j)] = (deviation / widths[j]).powi(2);
             }
         }
         if covariance.iter().any(|v| !v.is_finite()) {
             return None;
         }
         Some(Self {
-            theta: mean.as_slice().to_vec(),
-            axes: principal_axes(covariance),
+            theta: mean.component_mul(&widths).as_slice().to_vec(),
+            axes: DMatrix::from_diagonal(&widths) * principal_axes(covariance),
+            widths,
         })
     }
 
     /// Standard deviation of each entry.
     pub fn std_errors(&self) -> Vec<f64> {
-        self.axes.row_iter().map(|row| row.norm()).collect()
+        let rows = self.axes.row_iter();
+        rows.map(|row| norm(row.transpose().as_slice())).collect()
     }
 
     /// Squared distance of θ from the mean, in standard deviations: χ² of as many degrees of freedom as there are entries, for a draw.
     pub fn squared_distance(&self, theta: &[f64]) -> f64 {
-        let away = DVector::from_fn(theta.len(), |j, _| theta[j] - self.theta[j]);
-        solve_truncated(&self.axes, &away, BUDGET.least_axis)
+        let widths = &self.widths;
+        let away = DVector::from_fn(theta.len(), |j, _| (theta[j] - self.theta[j]) / widths[j]);
+        let (n, d) = self.axes.shape();
+        let axes = DMatrix::from_fn(n, d, |i, j| self.axes[(i, j)] / widths[i]);
+        solve_truncated(&axes, &away, BUDGET.least_axis)
             .map_or(f64::INFINITY, |own| own.norm_squared())
     }
 }
@@ -85,17 +99,15 @@ fn moments(draws: &[DVector<f64>]) -> (DVector<f64>, DMatrix<f64>) {
     (mean, covariance)
 }
 
-fn first_order(problem: &Problem, fitted: &Fitted, own: usize) -> (DVector<f64>, DMatrix<f64>) {
-    let slopes = DVector::from_vec(problem.coordinates.slopes(&fitted.theta));
-    let slopes = DMatrix::from_diagonal(&slopes);
-    let covariance = match fitted.information.clone().try_inverse() {
-        Some(inverse) => &slopes * inverse * &slopes,
-        None => DMatrix::zeros(slopes.nrows(), slopes.nrows()),
-    };
-    (
-        DVector::from_column_slice(&fitted.theta[..own]),
-        covariance.view((0, 0), (own, own)).into_owned(),
-    )
+/// The covariance of the first entries over their widths, to first order.
+fn first_order(problem: &Problem, fitted: &Fitted, widths: &DVector<f64>) -> DMatrix<f64> {
+    let own = widths.len();
+    let slopes = DVector::from_column_slice(&problem.coordinates.slopes(&fitted.theta)[..own]);
+    let slopes = DMatrix::from_diagonal(&slopes.component_div(widths));
+    match fitted.information.clone().try_inverse() {
+        Some(inverse) => &slopes * inverse.view((0, 0), (own, own)) * &slopes,
+        None => DMatrix::zeros(own, own),
+    }
 }
 
 #[cfg(test)]

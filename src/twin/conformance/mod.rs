@@ -17,8 +17,9 @@ mod tests;
 
 pub(crate) use step::{check_step, coarse_step};
 
-use crate::math::thin_svd;
-use crate::record::{Drive, Signal};
+use crate::math::{six_digits, thin_svd};
+use crate::record::{Drive, Signal, check_sizes};
+use crate::setting::number;
 use crate::twin::{
     DigitalTwin, Noise, PRIOR_DEVIATION, Parameter, ParameterSpace, SimulationError, combination,
 };
@@ -96,7 +97,7 @@ fn warned(message: impl Into<String>) -> Outcome {
 /// Runs every check under `drive`; `seed` draws the noise and the parameters.
 ///
 /// 1. *parameters*: names, prior boxes and bounds make sense;
-/// 2. *channels*: outputs have the declared shape;
+/// 2. *channels*: outputs have the declared shape, and sizes that can be computed with;
 /// 3. *finite*: trajectories are finite at the centre and the corners of the prior box (up to 64 of them);
 /// 4. *repeatable*: the same arguments give the same bits;
 /// 5. *noise*: another sample gives another trajectory;
@@ -121,7 +122,10 @@ pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let first = match setting.run(&setting.centre) {
         Ok(outputs) => outputs,
         Err(error) => {
-            let message = format!("at the prior's centre {:?}: {error}", setting.centre);
+            let message = format!(
+                "at the prior's centre {}: {error}",
+                setting.written(&setting.centre)
+            );
             findings.push(Finding::failure("finite", message));
             return findings;
         }
@@ -157,6 +161,14 @@ impl Setting<'_> {
         self.twin.simulate(theta, self.drive, self.noise)
     }
 
+    /// A point in words: `a = 1.5, b = 2`.
+    fn written(&self, theta: &[f64]) -> String {
+        let values = self.space.iter().zip(theta);
+        let values =
+            values.map(|(p, value)| format!("{} = {}", p.name, number(six_digits(*value))));
+        values.collect::<Vec<_>>().join(", ")
+    }
+
     fn parameters(&self) -> Outcome {
         let space = &self.space;
         if space.is_empty() {
@@ -179,6 +191,9 @@ impl Setting<'_> {
                 "outputs are {:?}, {expected:?} (samples, channels) were declared; return one row a sample and one column an output",
                 first.dim()
             ));
+        }
+        if let Err(error) = check_sizes(first, "output", &self.twin.signals().outputs) {
+            return failed(format!("at the prior's centre {error}"));
         }
         Ok(format!("{} samples, {} outputs", expected.0, expected.1))
     }
@@ -222,7 +237,8 @@ impl Setting<'_> {
         };
         let (lost, all) = (bad.count() + 1, corners.len());
         let message = format!(
-            "{problem} at the prior's corner {theta:?} ({lost} of {all} corners); such draws are redrawn: shrink the prior or the step"
+            "{problem} at the prior's corner {} ({lost} of {all} corners); such draws are redrawn: shrink the prior or the step",
+            self.written(theta)
         );
         let severity = match lost == all {
             true => Severity::Failure,
