@@ -51,10 +51,9 @@ struct Extent {
 
 impl Report<'_> {
     /// Decides, locates and measures.
-    pub fn diagnosis(&self) -> Result<Diagnosis, StudyError> {
+    pub fn diagnosis(&self, detection: Detection) -> Result<Diagnosis, StudyError> {
         let (known, base) = (&self.found.known, &self.found.evidence.base);
         let (settings, records) = (self.watch.settings, &base.model.problem.records);
-        let (detection, is_cut) = self.detection()?;
         let (answer, absorbed) = self.answer()?;
         let (answer, check) = self.checked(answer)?;
         let accepted = self.accepted(&answer).and_then(|e| e.model.as_ref());
@@ -113,7 +112,7 @@ impl Report<'_> {
             proportional_noise: base.noise_at(|part| matches!(part, Part::Share { .. })),
             outliers: base.noise_at(|part| matches!(part, Part::Effect { .. })),
             quick: settings.quick,
-            interrupted: self.found.is_partial || is_cut,
+            interrupted: self.found.is_partial,
             integrator: self.finer().map(|step| step.integrator),
             substeps: self.finer().map(|step| step.stepping.substeps),
             hold: self.other_hold().map(|stepping| stepping.hold),
@@ -171,7 +170,7 @@ impl Report<'_> {
 
     /// Evidence for a gap, with a p-value from records that the twin simulates where that is asked for; and whether fewer than asked for
     /// were simulated, since the work was stopped.
-    fn detection(&self) -> Result<(Detection, bool), StudyError> {
+    pub fn detection(&self) -> Result<(Detection, bool), StudyError> {
         let settings = self.watch.settings;
         let own = self.found.known.posterior().log_odds;
         let mut detection = Detection {

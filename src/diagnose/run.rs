@@ -61,32 +61,70 @@ fn whole(
     check(study, records, validation, settings)?;
     let watch = Watch { settings, progress };
     let trusting = study.trusting_starts();
-    let found = searched(study, records, watch)?;
+    let mut found = searched(study, records, watch)?;
+    let mut held = None;
+    if contradicts_start(study, &found, records, settings) {
+        match searched(&trusting, records, watch) {
+            Err(StudyError::Cancelled(_)) if settings.give_partial => found.is_partial = true,
+            other => held = Some(other?),
+        }
+    }
     let log_z = |found: &Search<Setup<'_>>| Some(found.known.listed_log_z());
-    let again = || searched(&trusting, records, watch);
-    let (found, is_held) = match contradicts_start(study, &found, records, settings) {
-        true => with_better_start(found, log_z, again)?,
-        false => (found, false),
+    let (found, is_held) = match held {
+        Some(held) => with_better_start(found, log_z, || Ok::<_, StudyError>(held))?,
+        None => (found, false),
     };
     let study = if is_held { &trusting } else { study };
-    // What is left to do for a partial answer is done as for a quick look, without a share: that takes longest.
+    let diagnosis = reported(study, found, validation, watch)?;
+    Ok(Diagnosis {
+        seconds: clock.elapsed().as_secs_f64(),
+        ..diagnosis
+    })
+}
+
+/// The report of a search. Where the search or its report is stopped, what was found is reported as for a quick look, without a share, which
+/// takes longest.
+fn reported(
+    study: &Study,
+    mut found: Search<Setup<'_>>,
+    validation: Option<&Record>,
+    watch: Watch<'_>,
+) -> Result<Diagnosis, StudyError> {
+    fn report<'d>(
+        study: &'d Study,
+        found: &'d Search<Setup<'d>>,
+        validation: Option<&'d Record>,
+        watch: Watch<'d>,
+    ) -> Report<'d> {
+        Report {
+            study,
+            found,
+            validation: validation.map(std::slice::from_ref),
+            watch,
+        }
+    }
+    let Watch { settings, progress } = watch;
     let hurried = DiagnoseSettings {
         quick: true,
         calibrate: 0,
         ..settings.clone()
     };
-    let settings = if found.is_partial { &hurried } else { settings };
-    let report = Report {
-        study,
-        found: &found,
-        validation: validation.map(std::slice::from_ref),
-        watch: Watch { settings, progress },
+    let is_stopped = found.is_partial;
+    let used = Watch {
+        settings: if is_stopped { &hurried } else { settings },
+        progress,
     };
-    let diagnosis = report.diagnosis()?;
-    Ok(Diagnosis {
-        seconds: clock.elapsed().as_secs_f64(),
-        ..diagnosis
-    })
+    let (detection, is_cut) = report(study, &found, validation, used).detection()?;
+    if !is_stopped && !is_cut {
+        match report(study, &found, validation, watch).diagnosis(detection) {
+            Err(StudyError::Cancelled(_)) if settings.give_partial => {}
+            whole => return whole,
+        }
+    }
+    found.is_partial = true;
+    found.evidence.base.model.problem.passes().go_on();
+    let settings = &hurried;
+    report(study, &found, validation, Watch { settings, progress }).diagnosis(detection)
 }
 
 /// Returns whether a first row is not what the twin's code says, and something is missing.

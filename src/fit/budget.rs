@@ -1,7 +1,8 @@
 //! Budget of a fit: its cost, and the tolerances at which it ends.
 
+use crate::progress::{Cancelled, Progress};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Iterations of each search: loud noise has a way to go.
 pub(crate) const ITERATIONS: usize = 80;
@@ -160,16 +161,69 @@ numbers! {
     }
 }
 
-/// Passes over a record, of a filter or of an ensemble of simulations, with or without derivatives. Clones share the count.
+/// Passes over a record, of a filter or of an ensemble of simulations, with or without derivatives. Clones share the count, and end together
+/// once a listener asks to stop.
 #[derive(Clone, Default)]
-pub(crate) struct Passes(Arc<AtomicU64>);
+pub(crate) struct Passes(Arc<Counted>);
+
+#[derive(Default)]
+struct Counted {
+    passes: AtomicU64,
+    /// Listener that may ask to stop; silent by default.
+    progress: Progress,
+    /// `true` once nobody is asked any more.
+    goes_on: AtomicBool,
+}
 
 impl Passes {
-    pub fn count(&self, more: usize) {
-        self.0.fetch_add(more as u64, Ordering::Relaxed);
+    /// Passes that end when `progress` is cancelled.
+    pub fn heard_by(progress: &Progress) -> Self {
+        Self(Arc::new(Counted {
+            progress: progress.clone(),
+            ..Counted::default()
+        }))
+    }
+
+    /// Counts so many more; fails once the work is to stop.
+    pub fn count(&self, more: usize) -> Result<(), Cancelled> {
+        self.0.passes.fetch_add(more as u64, Ordering::Relaxed);
+        match self.0.goes_on.load(Ordering::Relaxed) {
+            true => Ok(()),
+            false => self.0.progress.checkpoint(),
+        }
+    }
+
+    /// Lets the passes go on from here whoever asks: what was found is put together.
+    pub fn go_on(&self) {
+        self.0.goes_on.store(true, Ordering::Relaxed);
     }
 
     pub fn so_far(&self) -> u64 {
-        self.0.load(Ordering::Relaxed)
+        self.0.passes.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Listener;
+
+    struct Stop;
+    impl Listener for Stop {
+        fn advanced(&self, _: &str, _: u64, _: u64) {}
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn passes_end_when_they_are_asked_to_until_the_end_is_at_hand() {
+        let passes = Passes::heard_by(&Progress::new(Arc::new(Stop)));
+        let shared = passes.clone();
+        assert!(shared.count(1).is_err());
+        passes.go_on();
+        assert!(shared.count(1).is_ok());
+        assert_eq!(passes.so_far(), 2);
+        assert!(Passes::default().count(1).is_ok());
     }
 }

@@ -291,7 +291,7 @@ impl Problem {
         let mut sums = vec![Some(0.0); thetas.len()];
         for (r, record) in self.records.iter().enumerate() {
             let own: Vec<Vec<f64>> = thetas.iter().map(|t| self.of_record(r, t)).collect();
-            self.passes.count(own.len());
+            self.passes.count(own.len())?;
             let values = self.likelihood.log_likelihoods(&own, record)?;
             for (sum, value) in sums.iter_mut().zip(values) {
                 *sum = sum.zip(value).map(|(sum, value)| sum + value);
@@ -313,7 +313,7 @@ impl Problem {
         let (mut log_likelihood, mut innovations) = (0.0, Some(vec![]));
         for (r, record) in self.records.iter().enumerate() {
             let theta = self.of_record(r, theta);
-            let (value, filtered) = self.counted().log_likelihood(&theta, record)?;
+            let (value, filtered) = self.counted()?.log_likelihood(&theta, record)?;
             log_likelihood += value;
             innovations = innovations.zip(filtered).map(|(mut all, filtered)| {
                 all.push(filtered);
@@ -332,14 +332,14 @@ impl Problem {
     }
 
     /// The likelihood, about to pass over a record.
-    fn counted(&self) -> &dyn Likelihood {
-        self.passes.count(1);
-        self.likelihood.as_ref()
+    fn counted(&self) -> Result<&dyn Likelihood, FilterError> {
+        self.passes.count(1)?;
+        Ok(self.likelihood.as_ref())
     }
 
     /// Outputs of a record predicted from its rows before, at θ of one record; `None` where only free runs are known.
     pub fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
-        self.counted().predicted(theta, record)
+        self.counted()?.predicted(theta, record)
     }
 
     /// Gradient and information of one record at the full θ; `None` where only differences give them.
@@ -347,7 +347,7 @@ impl Problem {
         let held = self.places[r].iter().map(|&j| self.axes[j].held).collect();
         let coordinates = self.coordinates_of[r].clone().holding(held);
         let own = self.of_record(r, theta);
-        self.counted().score(&own, &self.records[r], &coordinates)
+        self.counted()?.score(&own, &self.records[r], &coordinates)
     }
 
     /// Gain at which a fit is done, in nats.
@@ -375,21 +375,21 @@ impl Problem {
     /// Innovations of each record.
     pub fn filtered(&self, theta: &[f64]) -> Result<Vec<Filtered>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.counted().filtered(&self.of_record(r, theta), record))
+            .map(|(r, record)| self.counted()?.filtered(&self.of_record(r, theta), record))
             .collect()
     }
 
     /// Innovations and filtered states of each record.
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.counted().states(&self.of_record(r, theta), record))
+            .map(|(r, record)| self.counted()?.states(&self.of_record(r, theta), record))
             .collect()
     }
 
     /// Responses of the predictions of each record to small additions inside the twin; empty for a black box.
     pub fn responses(&self, theta: &[f64]) -> Result<Vec<Responses>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.counted().responses(&self.of_record(r, theta), record))
+            .map(|(r, record)| self.counted()?.responses(&self.of_record(r, theta), record))
             .filter_map(Result::transpose)
             .collect()
     }
@@ -397,7 +397,7 @@ impl Problem {
     /// States of each record given all of it; empty for a black box.
     pub fn smoothed(&self, theta: &[f64]) -> Result<Vec<States>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.counted().smoothed(&self.of_record(r, theta), record))
+            .map(|(r, record)| self.counted()?.smoothed(&self.of_record(r, theta), record))
             .filter_map(Result::transpose)
             .collect()
     }
@@ -406,7 +406,7 @@ impl Problem {
     pub fn disturbances(&self, theta: &[f64]) -> Result<Vec<Signal>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| {
-                self.counted()
+                self.counted()?
                     .disturbances(&self.of_record(r, theta), record)
             })
             .filter_map(Result::transpose)

@@ -103,7 +103,7 @@ pub enum StudyError {
     },
     /// The likelihood of a record cannot be computed.
     #[error(transparent)]
-    Filter(#[from] FilterError),
+    Filter(FilterError),
     /// The work was stopped.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -170,6 +170,15 @@ fn name(record: Option<usize>) -> String {
     record.map_or("the validation record".into(), |index| {
         format!("record {}", index + 1)
     })
+}
+
+impl From<FilterError> for StudyError {
+    fn from(error: FilterError) -> Self {
+        match error.is_cancelled() {
+            true => Self::Cancelled(Cancelled),
+            false => Self::Filter(error),
+        }
+    }
 }
 
 impl StudyError {

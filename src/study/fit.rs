@@ -3,7 +3,7 @@
 use super::{Study, StudyError};
 use crate::effect::Effect;
 use crate::fit::{
-    Fit, FitScore, FitSettings, ProfilesOf, Subject, Warning, other_hold, run, score,
+    Fit, FitScore, FitSettings, Passes, ProfilesOf, Subject, Warning, other_hold, run, score,
 };
 use crate::hypothesis::search::asked::with_asked_noise;
 use crate::hypothesis::search::effects::searched;
@@ -72,10 +72,12 @@ impl Study {
         let clock = Instant::now();
         let study = self.for_records(records)?;
         let stage = progress.stage("fit", 1);
-        let (mut fit, elsewhere) = study.fit_once(asks, records, settings)?;
+        let passes = Passes::heard_by(progress);
+        let (mut fit, elsewhere) = study.fit_once(asks, records, settings, &passes)?;
         if elsewhere && !self.file.effect.is_empty() {
             let trusting = study.trusting_starts();
-            let again = || (trusting.fit_once(asks, records, settings)).map(|(fit, _)| fit);
+            let again =
+                || (trusting.fit_once(asks, records, settings, &passes)).map(|(fit, _)| fit);
             let log_z = |fit: &Fit| Some(fit.evidence.as_ref()?.log_evidence);
             (fit, _) = with_better_start(fit, log_z, again)?;
         }
@@ -90,12 +92,13 @@ impl Study {
         asks: bool,
         records: &[Record],
         settings: &FitSettings,
+        passes: &Passes,
     ) -> Result<(Fit, bool), StudyError> {
         let effects = self.added_effects()?;
         let noise = settings.noise();
         let fitted = |twin: &Twin| -> Result<_, StudyError> {
             let measured = measured(twin, records, &self.beliefs())?;
-            let searched = searched(&measured, &effects, records.into(), noise)?;
+            let searched = searched(&measured, &effects, records.into(), noise, passes)?;
             Ok((measured, searched))
         };
         let (mut measured, mut searched) = fitted(&self.twin)?;

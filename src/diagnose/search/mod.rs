@@ -29,8 +29,9 @@ use self::budget::{BUDGET, Budget};
 use self::evidence::{Change, Evidence, Purpose};
 use super::settings::DiagnoseSettings;
 use super::thresholds::THRESHOLDS;
+use crate::fit::Passes;
 use crate::hypothesis::set::TermSet;
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Progress;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use std::collections::BTreeSet;
@@ -71,6 +72,16 @@ pub(in crate::diagnose) struct Watch<'w> {
     pub progress: &'w Progress,
 }
 
+impl Watch<'_> {
+    /// Returns whether an answer is there; not where the work was stopped and the search ends with what it found before.
+    fn is_there(&self, answer: Result<(), StudyError>, is_known: bool) -> Result<bool, StudyError> {
+        match answer {
+            Err(StudyError::Cancelled(_)) if self.settings.give_partial && is_known => Ok(false),
+            answer => answer.map(|()| true),
+        }
+    }
+}
+
 /// Fits the twin of a study, and searches for what explains the records beside it.
 pub(in crate::diagnose) fn searched<'s>(
     study: &'s Study,
@@ -79,7 +90,8 @@ pub(in crate::diagnose) fn searched<'s>(
 ) -> Result<Search<Setup<'s>>, StudyError> {
     let stage = watch.progress.stage("fit", 1);
     let budget = BUDGET;
-    let setup = Setup::new(study, records.into(), watch.settings, &budget)?;
+    let passes = Passes::heard_by(watch.progress);
+    let setup = Setup::new(study, records.into(), watch.settings, &budget, passes)?;
     stage.tick()?;
     search(setup, budget, watch)
 }
@@ -129,7 +141,7 @@ impl<E: Evidence> Search<E> {
     /// Searches these rows until they ask for no change, and then for what the best sets leave.
     fn settled(self, watch: Watch<'_>) -> Result<Self, StudyError> {
         let mut best = self.run(watch)?;
-        while let Some(change) = best.asks_for()? {
+        while let Some(change) = best.asked_for(watch)? {
             let next = match best.with(&change, watch) {
                 Ok(Some(next)) => next.run(watch),
                 Ok(None) => Err(StudyError::NoStart),
@@ -151,25 +163,39 @@ impl<E: Evidence> Search<E> {
         best.finish(watch)
     }
 
+    /// As [`asks_for`](Self::asks_for); a search that is stopped meanwhile asks for nothing.
+    fn asked_for(&mut self, watch: Watch<'_>) -> Result<Option<Change>, StudyError> {
+        let mut change = None;
+        let asked = self.asks_for().map(|asked| change = asked);
+        self.is_partial |= !watch.is_there(asked, true)?;
+        Ok(change)
+    }
+
     /// Asks all stages, again from the start where the twin fits better from θ of an explanation than from its own.
     fn run(mut self, watch: Watch<'_>) -> Result<Self, StudyError> {
         let mut progress = watch.progress.stage("explain", STAGES.len());
         let mut stages = STAGES.into_iter();
         while let Some(stage) = stages.next().filter(|_| !self.is_partial) {
-            self.ask_all(stage)?;
+            let asked = self.ask_all(stage);
+            let asked = asked.and_then(|()| Ok(progress.tick()?));
             let is_known = !self.known.listed().is_empty();
-            match progress.tick() {
-                Err(Cancelled) if watch.settings.give_partial && is_known => self.is_partial = true,
-                other => other?,
-            }
+            self.is_partial = !watch.is_there(asked, is_known)?;
             let may_be_better = matches!(stage, Stage::Effects | Stage::Pairs);
-            if may_be_better && !self.is_partial && self.fit_again()? {
+            if may_be_better && !self.is_partial && self.fits_better(watch)? {
                 progress = watch.progress.stage("explain", STAGES.len());
                 stages = STAGES.into_iter();
             }
         }
         progress.finish();
         Ok(self)
+    }
+
+    /// As [`fit_again`](Self::fit_again); a search that is stopped meanwhile stays as it is.
+    fn fits_better(&mut self, watch: Watch<'_>) -> Result<bool, StudyError> {
+        let mut is_better = false;
+        let fitted = self.fit_again().map(|better| is_better = better);
+        self.is_partial = !watch.is_there(fitted, true)?;
+        Ok(is_better)
     }
 
     /// The search whose explanations are carried on to all rows: nothing more is asked.
@@ -186,8 +212,9 @@ impl<E: Evidence> Search<E> {
     fn finish(mut self, watch: Watch<'_>) -> Result<Self, StudyError> {
         if !self.is_partial && self.next(Stage::Rest).is_some() {
             let progress = watch.progress.stage("what is left", 1);
-            self.ask_all(Stage::Rest)?;
-            self.is_partial = watch.settings.ends(progress.tick())?;
+            let asked = self.ask_all(Stage::Rest);
+            let asked = asked.and_then(|()| Ok(progress.tick()?));
+            self.is_partial = !watch.is_there(asked, true)?;
         }
         Ok(self)
     }

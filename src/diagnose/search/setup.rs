@@ -49,12 +49,14 @@ pub(in crate::diagnose) struct Setup<'s> {
 }
 
 impl<'s> Setup<'s> {
-    /// Fits the twin to the records, to their first rows where they are long, with a finer step where the records ask for it at once.
+    /// Fits the twin to the records, to their first rows where they are long, with a finer step where the records ask for it at once; passes
+    /// are added to these.
     pub fn new(
         study: &'s Study,
         records: Arc<[Record]>,
         settings: &'s DiagnoseSettings,
         budget: &Budget,
+        passes: Passes,
     ) -> Result<Self, StudyError> {
         let task = Task {
             study,
@@ -62,7 +64,7 @@ impl<'s> Setup<'s> {
             budget: budget.clone(),
             records,
             searched: None,
-            passes: Passes::default(),
+            passes,
         };
         let is_long = task.rows() >= budget.long_rows && study.twin().outline().is_some();
         task.setup(if is_long {
@@ -436,7 +438,7 @@ mod tests {
             detection_only: true,
             ..DiagnoseSettings::default()
         };
-        let setup = Setup::new(&study, records, &settings, &budget).unwrap();
+        let setup = Setup::new(&study, records, &settings, &budget, Passes::default()).unwrap();
         let progress = &Progress::silent();
         let watch = Watch {
             settings: &settings,

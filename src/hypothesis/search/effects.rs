@@ -6,7 +6,7 @@ use super::{Before, Breadth, listed};
 use crate::effect::Effect;
 use crate::fit::axis::Axis;
 use crate::fit::problem::Problem;
-use crate::fit::{Searched, fits};
+use crate::fit::{Passes, Searched, fits};
 use crate::hypothesis::limits::{SEARCH, TERM};
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
@@ -19,14 +19,15 @@ use crate::twin::{Noise, ParameterSpace, Role};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Fits a twin whose θ holds the free magnitudes of effects.
+/// Fits a twin whose θ holds the free magnitudes of effects; passes are added to these.
 pub(crate) fn searched(
     measured: &Measured,
     effects: &[Effect],
     records: Arc<[Record]>,
     noise: Noise,
+    passes: &Passes,
 ) -> Result<Searched, FilterError> {
-    let plain = Problem::of_measured(measured, records);
+    let plain = Problem::of_measured(measured, records).counted_with(passes);
     let space = measured.twin.parameters();
     if space.iter().all(|p| p.role != Role::Magnitude) {
         return Searched::alone(plain, noise);

@@ -1,5 +1,6 @@
 //! Errors of a filter.
 use crate::math::MathError;
+use crate::progress::Cancelled;
 use crate::record::RecordError;
 use crate::setting::{SettingError, number};
 use crate::twin::{SimulationError, TwinError};
@@ -49,6 +50,9 @@ pub enum FilterError {
         /// States of the twin.
         states: usize,
     },
+    /// The work was stopped.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// No differences could be taken around θ.
     #[error(transparent)]
     Difference(#[from] MathError),
@@ -60,6 +64,18 @@ impl FilterError {
         match self {
             Self::Diverged { .. } | Self::NoSpread { .. } => true,
             Self::Simulation(error) => error.costs_one_run(),
+            _ => false,
+        }
+    }
+
+    /// Returns whether the work was stopped, in a search of the filter's own, too.
+    pub(crate) fn is_cancelled(&self) -> bool {
+        match self {
+            Self::Cancelled(_) => true,
+            Self::Difference(MathError::Fatal(inner)) => {
+                inner.downcast_ref::<Self>().is_some_and(Self::is_cancelled)
+                    || inner.is::<Cancelled>()
+            }
             _ => false,
         }
     }
