@@ -183,6 +183,11 @@ pub mod fuzzing {
     pub mod programs {
         pub use crate::external::program::fuzzing::*;
     }
+    /// Calls of the command line.
+    #[cfg(feature = "cli")]
+    pub mod calls {
+        pub use crate::cli::fuzzing::*;
+    }
     /// Runs of evaluations.
     #[cfg(feature = "evaluate")]
     pub mod runs {

@@ -1,11 +1,11 @@
 //! Messages on standard error; errors as one line and an exit code.
 
 use super::remedy::{Cause, Remedy};
-use crate::storage::untrusted::{one_line, printable};
+pub(super) use super::terminal::say;
+use crate::storage::untrusted::one_line;
 use crate::storage::work::Ranks;
 use crate::study::StudyError;
 use std::fmt::Display;
-use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -31,11 +31,6 @@ const NUMBERS: [(&str, &str); 6] = [
 ];
 const WHOLE: &str =
     "expected a whole number in digits, such as 100, without sign, point or exponent";
-
-/// Prints a message to standard error; a closed pipe is ignored.
-pub(super) fn say(text: &str) {
-    let _ = writeln!(io::stderr().lock(), "{}", printable(text));
-}
 
 /// The reason why a verb ended early.
 #[derive(Debug)]

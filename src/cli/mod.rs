@@ -19,6 +19,7 @@ mod border;
 mod context;
 mod external;
 mod failure;
+pub(crate) mod fuzzing;
 mod options;
 mod output;
 mod posterior;
@@ -29,9 +30,11 @@ mod records;
 mod remedy;
 mod shell_word;
 mod stop;
+mod terminal;
 mod verbs;
 
 use crate::estimator::Project;
+use crate::progress::Progress;
 use crate::storage::StorageError;
 use crate::storage::work::Ranks;
 use crate::study::StudyError;
@@ -85,10 +88,12 @@ pub fn run<P: Into<Project>, E: Into<StudyError>>(
     let result = projects
         .map_err(|error| Failure::from(error.into()))
         .and_then(|projects| {
+            let progress = progress::bars();
             let call = Call {
                 arguments: &arguments,
                 words: &words,
                 study_file,
+                progress: &progress,
             };
             let work = || in_pool(arguments.threads, || call.dispatch(&projects, &ranks));
             border::guarded(work)
@@ -146,13 +151,14 @@ struct Call<'a> {
     arguments: &'a Arguments,
     words: &'a [OsString],
     study_file: Option<PathBuf>,
+    progress: &'a Progress,
 }
 
 impl Call<'_> {
     fn dispatch(self, registered: &[Project], ranks: &Ranks) -> Result<ExitCode, Failure> {
         let progress = match ranks.is_root() {
-            true => progress::bars(),
-            false => progress::bars().unshown(),
+            true => self.progress.clone(),
+            false => self.progress.unshown(),
         };
         let arguments = self.arguments;
         let external = external::study(&arguments.external, registered)?.map(Project::from);

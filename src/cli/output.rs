@@ -2,20 +2,20 @@
 
 use super::failure::Failure;
 pub(super) use super::failure::say;
+use super::terminal;
 use crate::storage::NewFolder;
 use crate::storage::files::with_remedy;
 use crate::storage::place::{check_place, is_taken, probe_file};
 use crate::storage::untrusted::{hidden, printable};
 use serde_json::Value;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Prints a result; a closed pipe (`| head`) is no failure. Control characters from names and units are escaped.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
     let text = printable(text);
-    let mut out = io::stdout().lock();
     let ends = if text.ends_with('\n') { "" } else { "\n" };
-    match write!(out, "{text}{ends}").and_then(|()| out.flush()) {
+    match terminal::print(&format!("{text}{ends}")) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::user(format!(
             "standard output: {}",
             with_remedy(&error)

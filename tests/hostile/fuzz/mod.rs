@@ -6,6 +6,7 @@
 mod limits;
 mod mutate;
 mod readers;
+mod verbs;
 
 use crate::memory;
 
