@@ -4,6 +4,7 @@ use crate::fit::axis::{Axis, EvidencePrior, Family};
 use crate::fit::budget::Passes;
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Responses, Score, States};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
+use crate::math::LANES;
 use crate::record::{Record, Signal};
 use crate::twin::{Noise, Outline, Parameter, ParameterSpace, Role, Stepping, Twin};
 use std::sync::Arc;
@@ -288,13 +289,18 @@ impl Problem {
 
     /// Log-likelihoods of all records at several θ, on all cores; `None` where the twin does not work.
     pub fn log_likelihoods(&self, thetas: &[Vec<f64>]) -> Result<Vec<Option<f64>>, FilterError> {
+        // As many as keep all cores busy: a stop is heard between them.
+        let of_core = if self.is_simulated() { 1 } else { LANES };
+        let at_once = of_core * rayon::current_num_threads();
         let mut sums = vec![Some(0.0); thetas.len()];
         for (r, record) in self.records.iter().enumerate() {
             let own: Vec<Vec<f64>> = thetas.iter().map(|t| self.of_record(r, t)).collect();
-            self.passes.count(own.len())?;
-            let values = self.likelihood.log_likelihoods(&own, record)?;
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum = sum.zip(value).map(|(sum, value)| sum + value);
+            for (own, sums) in own.chunks(at_once).zip(sums.chunks_mut(at_once)) {
+                self.passes.count(own.len())?;
+                let values = self.likelihood.log_likelihoods(own, record)?;
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum = sum.zip(value).map(|(sum, value)| sum + value);
+                }
             }
         }
         Ok(sums)

@@ -140,10 +140,14 @@ fn parameters_of_any_size_are_estimated_alike() {
     }
     let [value, ..] = answers[0];
     assert!((value - 1.0).abs() < 0.1, "{answers:?}");
-    // The network computes with 32 bits.
-    let is_alike = |(own, first): (&f64, &f64)| (own - first).abs() < 0.01 * first.abs();
+    // The network computes with 32 bits, and is trained on 200 simulations.
     for answer in &answers {
-        assert!(answer.iter().zip(&answers[0]).all(is_alike), "{answers:?}");
+        let [value, error, low, gate, after] = *answer;
+        let first = &answers[0];
+        assert!((value - first[0]).abs() < 0.1 * first[1], "{answers:?}");
+        assert!((error / first[1] - 1.0).abs() < 0.05, "{answers:?}");
+        assert!((low - first[2]).abs() < 0.2 * first[1], "{answers:?}");
+        assert!(gate > 0.1 && after > 0.1, "{answers:?}");
     }
 }
 

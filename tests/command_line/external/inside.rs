@@ -214,7 +214,7 @@ fn an_end_in_a_shared_exchange_costs_the_pass_that_it_is_of() {
     if python().is_none() {
         return;
     }
-    let [alone, together] = passes_of("long", "if max(l) > 0.95: os._exit(3)", &lengths(9));
+    let [alone, together] = passes_of("long", "max(l) > 0.95 and os._exit(3)", &lengths(9));
     assert_eq!(alone.0, together.0);
     let worked: Vec<bool> = together.0.iter().map(Option::is_some).collect();
     assert_eq!(worked, [vec![true; 8], vec![false]].concat());

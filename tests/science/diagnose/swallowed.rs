@@ -1,6 +1,6 @@
 //! Disturbances that fitted noise would swallow, and honest noise that it would not.
 
-use super::trials::{study, with_settings};
+use super::trials::{line, study, with_settings};
 use super::{Decision, Verdict};
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis};
 use truetwin::record::{Drive, Record, Signal};
@@ -44,10 +44,9 @@ fn bursts_are_called(seeds: u64) {
             (force + DECLARED) * source.normal()
         });
         let found = quick(record);
-        let check = found
-            .check
-            .as_ref()
-            .expect("no effect explains random bursts");
+        let Some(check) = &found.check else {
+            panic!("{seed}: bursts are explained: {}", line("bursts", &found));
+        };
         assert_eq!(found.verdict, Verdict::StructuralGap, "{seed}: {check:?}");
         assert_eq!(found.cause.decision, Decision::NoneOfThese);
         assert!(found.cause.probabilities.nothing < 0.5);

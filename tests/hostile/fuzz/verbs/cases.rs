@@ -129,11 +129,11 @@ const STUDIES: [&str; 8] = [
     "[parameters]\nr = { prior = [1.0, 3.0] }\n[states]\nx = { next = \"r*x*(1 - x)\", start = 0.3, noise = 0.001, limits = [0, 1] }\n\
      [outputs]\ny = { value = \"x\", noise = { std = \"0.01 + 0.1*abs(x)\" } }\n[record]\nstep = 1\nsamples = 25\n",
     "[parameters]\nke = { unit = \"1/h\", prior = [0.1, 1.0], bounds = [0.01, 3.0] }\nV = { unit = \"L\", prior = [5, 20], bounds = [1, 50] }\n\
-     [states]\nc = { rate = \"-ke*c\", start = 0.0 }\n[inputs]\ndose = { unit = \"mg\" }\n[outputs]\nconc = { value = \"c/V\", noise = 0.01 }\n\
-     [record]\nstep = 0.5\nsamples = 30\nhold = { dose = \"impulse\" }\ninput = { levels = [0, 10], hold = 8 }\n",
+     [states]\nc = { rate = \"-ke*c\", start = 0.0 }\n[inputs]\ndose = { unit = \"mg\", hold = \"impulse\" }\n[outputs]\nconc = { value = \"c/V\", noise = 0.01 }\n\
+     [record]\nstep = 0.5\nsamples = 30\ninput = { levels = [0, 10], hold = 8 }\n",
     "[parameters]\na = { prior = [0.5, 2.0], bounds = [0.1, 5.0] }\nb = { prior = [-1, 1], bounds = [-5, 5] }\n[states]\n\
      x = { rate = \"a*(u1 - x)\" }\nz = { rate = \"b*u2 - z\", start = 0 }\n[inputs]\nu2 = {}\nu1 = {}\n[outputs]\n\
-     y2 = { value = \"x\", noise = 0.02 }\ny1 = { value = \"x + z\", noise = \"estimate\" }\n[record]\nstep = 0.2\nsamples = 30\n\
+     y2 = { value = \"x\", noise = 0.02 }\ny1 = { value = \"x + z\", noise = 0.05 }\n[record]\nstep = 0.2\nsamples = 30\n\
      input = { u1 = { levels = [-1, 1], hold = 5 }, u2 = 0.5 }\n",
     "twin = 'van-der-pol'\n[record]\nstep = 0.05\nsamples = 60\n[prior]\nnu = [0.5, 2.5]\n",
 ];
