@@ -1,6 +1,7 @@
 //! A record on another time grid, of one step.
 
 use super::table::MOST_SAMPLES;
+use crate::math::three_digits;
 use crate::record::{Drive, Record, RecordError, Signal};
 use crate::setting::number;
 use crate::storage::untrusted::MOST_NUMBERS;
@@ -62,7 +63,7 @@ pub fn resample(
         Err(RecordError::Resample(format!(
             "a step of {} s leaves {problem} of a record of {} s; {remedy}",
             number(step),
-            number(length)
+            number(three_digits(length))
         )))
     };
     if steps < 1.0 {

@@ -271,7 +271,11 @@ fn quality(fit: &Fit) -> Vec<Block> {
         let error = evidence
             .std_error
             .map_or(String::new(), |e| format!(" ± {}", short(e)));
-        search += &format!(" Log evidence {:.2}{error} nats.", evidence.log_evidence);
+        let nats = match evidence.log_evidence {
+            huge if huge.abs() >= 1e6 => short(huge),
+            nats => format!("{nats:.2}"),
+        };
+        search += &format!(" Log evidence {nats}{error} nats.");
     }
     let steps = (fit.steps).map_or(String::new(), |taken| {
         format!(" The twin took {}.", taken.text())

@@ -1,7 +1,7 @@
 //! Laws and magnitudes that sensors and actuators share.
 
 use super::super::magnitude::{Magnitude, Shape};
-use crate::math::nearest;
+use crate::math::{nearest, three_digits};
 use crate::setting::number;
 use crate::twin::Remember;
 
@@ -157,7 +157,7 @@ pub(super) fn check_delay(delay: f64, dt: f64) -> Result<(), String> {
         "delay = {} s, but at a step of {} s at most {} s are kept; choose a shorter delay or a longer step",
         number(delay),
         number(dt),
-        number(longest)
+        number(three_digits(longest))
     ))
 }
 

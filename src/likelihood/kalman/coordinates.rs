@@ -19,6 +19,7 @@ pub struct Coordinates {
     theta_lower: Vec<f64>,
     theta_upper: Vec<f64>,
     held: Vec<bool>,
+    unled: Vec<bool>,
 }
 
 impl Coordinates {
@@ -39,6 +40,7 @@ impl Coordinates {
             lower: forward(&log, &theta_lower),
             upper: forward(&log, &theta_upper),
             held: vec![false; log.len()],
+            unled: vec![false; log.len()],
             log,
             steps,
             theta_lower,
@@ -49,6 +51,16 @@ impl Coordinates {
     /// The same, some entries held: no derivative is taken by them.
     pub(crate) fn holding(self, held: Vec<bool>) -> Self {
         Self { held, ..self }
+    }
+
+    /// The same, one-sided slopes by some entries left where they are taken, half a step away.
+    pub(crate) fn leaving(self, unled: Vec<bool>) -> Self {
+        Self { unled, ..self }
+    }
+
+    /// Returns whether one-sided slopes by an entry are led back to where the step begins.
+    pub(super) fn leads_back(&self, j: usize) -> bool {
+        !self.unled[j]
     }
 
     /// Entries by which derivatives are taken.

@@ -70,15 +70,21 @@ impl FilterError {
 
     /// Returns whether the work was stopped, in a search of the filter's own, too.
     pub(crate) fn is_cancelled(&self) -> bool {
-        match self {
-            Self::Cancelled(_) => true,
-            Self::Difference(MathError::Fatal(inner)) => {
-                inner.downcast_ref::<Self>().is_some_and(Self::is_cancelled)
-                    || inner.is::<Cancelled>()
-            }
-            _ => false,
-        }
+        stops(self)
     }
+}
+
+/// Returns whether an error is that of work that was stopped, whatever is around it.
+fn stops(error: &(dyn std::error::Error + 'static)) -> bool {
+    let inner = match (error.downcast_ref(), error.downcast_ref()) {
+        (Some(FilterError::Cancelled(_)), _) => return true,
+        (Some(FilterError::Difference(MathError::Fatal(inner))), _)
+        | (_, Some(MathError::Fatal(inner))) => Some(&**inner),
+        _ => None,
+    };
+    error.is::<Cancelled>()
+        || inner.is_some_and(|inner| stops(inner))
+        || error.source().is_some_and(stops)
 }
 
 /// An error that only rules out one θ is no error of a search: `None`.

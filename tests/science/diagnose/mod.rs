@@ -280,7 +280,7 @@ fn what_absorbs_a_parameter_gap_is_no_more_probable_than_all_that_is_listed() {
     let effect = "[[effect]]\nid = 'state-ceiling'\ntarget = 'h1'\nto = 'h2'\nmagnitudes = { level = 5.0, spill = 0.0 }\n";
     let theta = [0.6, 0.5, 0.55, 1.0];
     let mut absorbed = 0;
-    for seed in 60..63 {
+    for seed in 63..66 {
         let noise = Noise::new(seed, "parameter-gap", 0);
         let record = record(study.twin(), effect, &theta, drive(&study, noise), noise);
         let settings = DiagnoseSettings {

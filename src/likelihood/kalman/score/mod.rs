@@ -166,13 +166,19 @@ impl Score {
         }
         let found = Self::assemble(kalman, log_likelihood, &centre, &jacobian)?;
         let middles = slopes.iter().map(|(_, middle)| *middle);
-        Ok(found.led_back(free.into_iter().zip(middles)))
+        Ok(found.led_back(coordinates, free.into_iter().zip(middles)))
     }
 
     /// Leads slopes, each taken at a distance along its entry, back to the centre.
-    fn led_back(mut self, middles: impl IntoIterator<Item = (usize, f64)>) -> Self {
+    fn led_back(
+        mut self,
+        coordinates: &Coordinates,
+        middles: impl IntoIterator<Item = (usize, f64)>,
+    ) -> Self {
         for (j, distance) in middles {
-            self.gradient[j] += distance * self.fisher[(j, j)];
+            if coordinates.leads_back(j) {
+                self.gradient[j] += distance * self.fisher[(j, j)];
+            }
         }
         self
     }
@@ -271,7 +277,9 @@ fn side_by_side(
                     Some((run, run.lane(job % lanes)?))
                 })
                 .collect();
-            Some(of_lanes(&each?, &moves, phi.len()))
+            let score = of_lanes(&each?, &moves, phi.len());
+            let middles = moves.iter().map(|to| (to.entry, 0.5 * to.distance));
+            Some(score.led_back(coordinates, middles))
         })
         .collect()
 }
@@ -322,8 +330,7 @@ fn of_lanes(each: &[(&Together, usize)], moves: &[Move], d: usize) -> Score {
         }
     }
     let log_likelihood = centre.log_likelihoods.0[c];
-    let found = Score::of_one_output(log_likelihood, &samples, [&shifts, &spreads]);
-    found.led_back(moves.iter().map(|to| (to.entry, 0.5 * to.distance)))
+    Score::of_one_output(log_likelihood, &samples, [&shifts, &spreads])
 }
 
 /// ln, by its series where it is short.

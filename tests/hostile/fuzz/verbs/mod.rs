@@ -80,6 +80,7 @@ fn fault(place: &Path, case: &Case, ended: &Ended, took: Duration) -> Option<Str
         1 if is_of_check => {}
         // The command line says more of a call that is stopped.
         1 if said == "error: cancelled" && took > PATIENCE => {}
+        130 if took > PATIENCE => {}
         2 if errors.len() == 1 && said.ends_with(errors[0]) => {}
         code => return Some(format!("code {code}: {said}")),
     }
@@ -99,7 +100,12 @@ fn fault(place: &Path, case: &Case, ended: &Ended, took: Duration) -> Option<Str
     } else {
         &ended.printed
     };
-    let own = |line: &&str| !line.starts_with("truetwin 0") && !line.contains("stopped");
+    // What a parser read is quoted as it writes it.
+    let own = |line: &&str| {
+        !line.starts_with("truetwin 0")
+            && !line.contains("stopped")
+            && !line.contains("found floating point")
+    };
     let lines = said.lines().chain(printed.lines()).filter(own);
     let given = String::from_utf8_lossy(
         &[&case.study[..], &case.records.concat(), &case.description].concat(),
@@ -123,8 +129,8 @@ fn fault(place: &Path, case: &Case, ended: &Ended, took: Duration) -> Option<Str
         return Some(format!("{left:?} stays"));
     }
     let has_out = place.join("o").exists() || place.join("o.csv").exists();
-    // A bank keeps the shards that are done.
-    let keeps = case.words[0] == "bank" && ended.code == 1;
+    // A bank keeps the shards that are done, whatever ends it.
+    let keeps = case.words[0] == "bank";
     (has_out && !is_of_check && ended.code != 0 && !keeps)
         .then(|| format!("code {}, and something is written: {said}", ended.code))
 }
