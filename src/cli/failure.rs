@@ -57,10 +57,13 @@ impl Failure {
 
     /// Creates the failure of a diagnosis: its records or options are wrong, the study file was accepted.
     pub fn diagnosis(error: StudyError) -> Self {
-        let cause = Cause::Call;
-        Self {
-            cause,
-            ..error.into()
+        let failure = Self::from(error);
+        match failure.cause {
+            Cause::Study => Self {
+                cause: Cause::Call,
+                ..failure
+            },
+            _ => failure,
         }
     }
 
