@@ -440,7 +440,7 @@ mod tests {
             assert!((z.column(j).std(0.0) - 1.0).abs() < 1e-9, "column {j}");
         }
         let back = scaler.invert(&z);
-        let off = (&back - &samples) / &aview1(&scaler.scale);
+        let off = (&back - &samples) / aview1(&scaler.scale);
         assert!(off.iter().all(|d| d.abs() < 1e-14));
     }
 

@@ -380,7 +380,7 @@ fn words(study: &str, random: &mut ChaCha8Rng) -> Vec<String> {
         15 => format!("resample r.csv --step {}", NUMBERS.choose(random).unwrap()),
         16 => format!("bank {twin} --size 6"),
         17 => format!("effects {twin}"),
-        18 => format!("compare s.toml s2.toml --record r.csv"),
+        18 => "compare s.toml s2.toml --record r.csv".to_owned(),
         _ => format!("diagnose r.csv {twin} --quick"),
     };
     let takes_out = !call.starts_with("check") && !call.starts_with("effects");
