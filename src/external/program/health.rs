@@ -1,7 +1,8 @@
 //! When failures of single runs mean that nothing works.
 
+use super::running::locked;
 use crate::twin::SimulationError;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 /// Failed runs after which a program that has never answered counts as broken.
 const NEVER: usize = 5;
@@ -63,7 +64,7 @@ impl Health {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0)
     }
 }
 

@@ -3,6 +3,7 @@
 use super::asking::Asker;
 use super::frame::PointTable;
 use super::inside::{Inside, ServedMethod};
+use super::running::locked;
 use super::shared::{Exchanges, PointsAsked};
 use crate::equations::Program;
 use crate::math::Lanes;
@@ -11,7 +12,7 @@ use crate::twin::{
     Blocks, Composed, Integrator, Interval, Now, Outline, SimulationError, StateSpace, Stepping,
 };
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Passes that are under way at once, so that their points share exchanges: a thread that waits for each. An exchange costs some 0.1 ms
 /// whatever it carries, and a pass some 5 µs of it to be woken: half as many passes nearly double the cost of each, twice as many save a
@@ -71,7 +72,7 @@ impl ServedEquations {
         match self.answer(method, now, table) {
             Ok(numbers) => Some(numbers),
             Err(error) => {
-                let mut faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut faults = locked(&self.faults);
                 // Of as many passes as are under way, twice over.
                 faults.truncate(2 * BESIDE);
                 faults.push_front((now.theta.to_vec(), error));
@@ -299,7 +300,7 @@ impl Blocks for ServedEquations {
         if let Err(error) = self.asker.health.check() {
             return Some(error);
         }
-        let mut faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut faults = locked(&self.faults);
         let own = faults.iter().position(|(at, _)| at == theta)?;
         faults.remove(own).map(|(_, error)| error)
     }

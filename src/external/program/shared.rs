@@ -7,9 +7,10 @@ use super::asking::{Asker, Unanswered};
 use super::frame::{self, LONGEST_LINE, PointTable};
 use super::inside::ServedMethod;
 use super::pool::ProgramRequest;
+use super::running::locked;
 use crate::twin::SimulationError;
 use std::collections::VecDeque;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
 use std::thread;
 
 /// Points of the trial of whether each is computed by itself, at least: wider than the blocks in which processors and libraries take numbers.
@@ -77,10 +78,6 @@ impl Seat {
             }
         }
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// An exchange under way: whatever becomes of it, nobody is left waiting.

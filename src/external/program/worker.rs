@@ -1,13 +1,13 @@
 //! The command that starts a program, and one running copy of it, asked line by line, with numbers behind a line.
 
-use super::running::Running;
+use super::running::{Running, locked};
 use crate::storage::files::with_remedy;
 use crate::storage::untrusted::{excerpt, one_line};
 use crate::study::StudyError;
 use std::io::{self, Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -215,7 +215,7 @@ impl Worker {
 
     /// Returns the last lines of standard error, as the end of a message; empty if there are none.
     pub fn last_words(&self) -> String {
-        let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
+        let words = locked(&self.words);
         match last_words(&words) {
             text if text.is_empty() => text,
             text => format!("; its standard error ends: {text}"),
@@ -290,7 +290,7 @@ fn read_all(mut from: impl Read, to: &SyncSender<Vec<u8>>) {
 fn drain(mut from: impl Read, kept: &Mutex<Vec<u8>>) {
     let mut piece = vec![0; PIECE];
     while let Some(length) = read(&mut from, &mut piece) {
-        let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = locked(kept);
         kept.extend_from_slice(&piece[length.saturating_sub(KEPT)..length]);
         let surplus = kept.len().saturating_sub(KEPT);
         kept.drain(..surplus);

@@ -6,7 +6,7 @@
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
-use crate::fit::starts::{Screen, climbs, screened};
+use crate::fit::starts::{Screen, climbs, random_point, ranked, screened};
 use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::twin::Noise;
@@ -26,16 +26,25 @@ pub(super) fn grown(
     noise: Noise,
     iterations: usize,
 ) -> Result<Vec<Vec<f64>>, FilterError> {
-    let mut starts = vec![];
-    for (level, share) in BUDGET.grown_shares.into_iter().enumerate() {
-        let short = begun(problem, share);
-        if level == 0 {
-            starts = screened(&short, noise.child("loud"), Screen::LOUD_APART)?;
-            let quiet = Screen::quiet(&short);
-            starts.extend(screened(&short, noise.child("quiet"), quiet)?);
-        }
+    let starts = |short: &Problem| {
+        let loud = screened(short, noise.child("loud"), Screen::LOUD_APART)?;
+        let quiet = screened(short, noise.child("quiet"), Screen::quiet(short))?;
+        Ok([loud, quiet].concat())
+    };
+    grow(problem, starts, (iterations, usize::MAX))
+}
+
+/// Starts over the beginning of the records, moved by fits to ever more of these, of which so many are kept, the best first.
+fn grow(
+    problem: &Problem,
+    starts: impl FnOnce(&Problem) -> Result<Vec<Vec<f64>>, FilterError>,
+    (iterations, kept): (usize, usize),
+) -> Result<Vec<Vec<f64>>, FilterError> {
+    let [first, second] = BUDGET.grown_shares.map(|share| begun(problem, share));
+    let mut starts = starts(&first)?;
+    for short in [first, second] {
         let fits = climbs(&short, &starts, iterations)?;
-        starts = fits.into_iter().map(|fit| fit.theta).collect();
+        starts = fits.into_iter().take(kept).map(|fit| fit.theta).collect();
     }
     Ok(starts)
 }
@@ -46,38 +55,19 @@ pub(crate) fn base_fit(
     initial: Option<&[f64]>,
     noise: Noise,
 ) -> Result<Option<Fitted>, FilterError> {
-    let space = problem.twin.parameters();
     let initial = initial.map(|theta| problem.clamp(&problem.full(theta)));
-    let mut starts: Vec<Vec<f64>> = (0..BUDGET.grown_points)
-        .map(|i| {
-            let noise = noise.child("starts").sample(i);
-            let theta = match i % 2 {
-                0 => space.draw_prior(noise),
-                _ => space.draw_bounds(noise),
-            };
-            problem.drawn(problem.full(&theta), noise)
-        })
+    let points = (0..BUDGET.grown_points)
+        .map(|i| random_point(problem, i, noise.child("starts")))
         .chain([problem.centre()])
         .chain(initial.clone())
         .collect();
-    for (level, share) in BUDGET.grown_shares.into_iter().enumerate() {
-        let short = begun(problem, share);
-        if level == 0 {
-            let values = short.log_posteriors(&starts)?;
-            let mut all: Vec<(f64, Vec<f64>)> = (values.into_iter().zip(starts))
-                .filter_map(|(value, theta)| Some((value?, theta)))
-                .collect();
-            all.sort_by(|a, b| b.0.total_cmp(&a.0));
-            starts = all
-                .into_iter()
-                .take(BUDGET.grown_starts)
-                .map(|(_, theta)| theta)
-                .collect();
-        }
-        let mut fits = climbs(&short, &starts, BUDGET.grown_iterations)?;
-        fits.truncate(BUDGET.grown_kept);
-        starts = fits.into_iter().map(|f| f.theta).collect();
-    }
+    let best = |short: &Problem| {
+        let mut starts = ranked(short, points)?;
+        starts.truncate(BUDGET.grown_starts);
+        Ok(starts)
+    };
+    let budget = (BUDGET.grown_iterations, BUDGET.grown_kept);
+    let mut starts = grow(problem, best, budget)?;
     starts.extend(initial);
     starts.push(problem.centre());
     Ok(climbs(problem, &starts, BUDGET.grown_iterations)?

@@ -79,11 +79,42 @@ pub(super) fn agreed(
             break;
         }
         let starts = grown(problem, noise.sample(round), iterations)?;
-        fits.extend(climbs(problem, &starts, iterations)?);
-        sort(&mut fits);
-        fits = polish(problem, fits, iterations)?;
+        fits = joined(problem, fits, &starts, iterations)?;
     }
     Ok(fits)
+}
+
+/// Fits, and those of searches from more starts.
+fn joined(
+    problem: &Problem,
+    mut fits: Vec<Fitted>,
+    starts: &[Vec<f64>],
+    iterations: usize,
+) -> Result<Vec<Fitted>, FilterError> {
+    fits.extend(climbs(problem, starts, iterations)?);
+    sort(&mut fits);
+    polish(problem, fits, iterations)
+}
+
+/// A random point of the prior or, in turn, of the bounds.
+fn random_point(problem: &Problem, i: u64, noise: Noise) -> Vec<f64> {
+    let space = problem.twin.parameters();
+    let noise = noise.sample(i);
+    let theta = match i % 2 {
+        0 => space.draw_prior(noise),
+        _ => space.draw_bounds(noise),
+    };
+    problem.drawn(problem.full(&theta), noise)
+}
+
+/// Points where the twin works, the most probable first.
+fn ranked(problem: &Problem, points: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, FilterError> {
+    let values = problem.log_posteriors(&points)?;
+    let mut all: Vec<(f64, Vec<f64>)> = (values.into_iter().zip(points))
+        .filter_map(|(value, theta)| Some((value?, theta)))
+        .collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Ok(all.into_iter().map(|(_, theta)| theta).collect())
 }
 
 /// Random points whose likelihood is looked at.
@@ -122,28 +153,17 @@ impl Screen {
 
 /// The best of random points.
 fn screened(problem: &Problem, noise: Noise, screen: Screen) -> Result<Vec<Vec<f64>>, FilterError> {
-    let space = problem.twin.parameters();
-    let points: Vec<Vec<f64>> = (0..screen.points)
+    let points = (0..screen.points)
         .map(|i| {
-            let noise = noise.sample(i);
-            let theta = problem.full(&match i % 2 {
-                0 => space.draw_prior(noise),
-                _ => space.draw_bounds(noise),
-            });
-            let theta = problem.drawn(theta, noise);
+            let theta = random_point(problem, i, noise);
             match screen.is_loud {
                 true => problem.begin(&theta),
                 false => problem.believed(&theta),
             }
         })
         .collect();
-    let values = problem.log_posteriors(&points)?;
-    let mut screened: Vec<(f64, Vec<f64>)> = (values.into_iter().zip(points))
-        .filter_map(|(value, theta)| Some((value?, theta)))
-        .collect();
-    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut starts: Vec<Vec<f64>> = vec![];
-    for (_, theta) in screened {
+    for theta in ranked(problem, points)? {
         let is_new = |one: &Vec<f64>| !screen.is_apart || is_apart(problem, one, &theta);
         if starts.len() < BUDGET.screened_starts && starts.iter().all(is_new) {
             starts.push(theta);

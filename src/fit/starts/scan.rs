@@ -3,11 +3,10 @@
 //! Random points hardly meet the narrow top of a frequency or a time while another parameter, which explains more, is wrong, too. Where the others
 //! are right, all of an axis can be looked at.
 
-use super::climbs;
+use super::joined;
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
-use crate::fit::starts::{polish, sort};
 use crate::likelihood::kalman::FilterError;
 
 /// Searches from the highest tops along the axes through the best fit, and again from a better one that these find.
@@ -23,9 +22,7 @@ pub(super) fn scanned(
         if starts.is_empty() {
             break;
         }
-        fits.extend(climbs(problem, &starts, iterations)?);
-        sort(&mut fits);
-        fits = polish(problem, fits, iterations)?;
+        fits = joined(problem, fits, &starts, iterations)?;
         if fits[0].objective <= before + BUDGET.restart_gain {
             break;
         }

@@ -57,7 +57,6 @@ mod score;
 mod settings;
 mod size;
 mod smooth;
-mod start;
 mod update;
 
 #[cfg(test)]

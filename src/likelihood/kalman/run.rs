@@ -1,16 +1,17 @@
 //! Runs of a filter at one θ, or at several side by side.
 
 mod beside;
+mod start;
 
 use super::normal::clip::clip;
 use super::order::Order;
 use super::pass::{FilterJob, Pass, Sink};
 use super::size::{Any, with_size};
-use super::start::spread_start;
 use super::{FilterError, Kalman};
 use crate::twin::{Acting, Now};
 
 pub(super) use beside::{Together, together};
+pub(super) use start::spread_start;
 
 impl Kalman<'_> {
     /// The record's drive as the twin sees it at θ, which is checked.

@@ -239,7 +239,7 @@ fn declared_levels_follow_the_states() {
     assert!(at(typical) > at(2.0 * typical) && at(typical) > at(0.5 * typical));
 }
 
-/// Of a start that the first rows contradict, 3 nats decide.
+/// A start that the first rows contradict stands where it explains 3 nats.
 #[test]
 fn a_contradicted_start_stands_where_it_explains_enough() {
     let better = |held: Option<f64>| {

@@ -13,7 +13,7 @@
 //! is a screen, not a likelihood: what changes covariances is left out.
 
 use crate::likelihood::kalman::order::Order;
-use crate::likelihood::kalman::start::spread_start;
+use crate::likelihood::kalman::run::spread_start;
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman};
 use crate::record::Signal;
 use crate::twin::{Acting, Composed, Entry, Now, Role};

@@ -1,13 +1,13 @@
 //! Mean and covariance of an uncertain start.
 
-use super::moments::REACH;
+use crate::likelihood::kalman::moments::REACH;
 use crate::twin::{Composed, Now};
 
 /// Adds the spread of the first state to `mean` and `cov` (n × n, zero); `false` where the start is known.
 ///
 /// States that follow from others (memories of effects) are correlated with them: each uncertain state is moved by ±√3 standard
 /// deviations, and what follows is set anew.
-pub(super) fn spread_start(
+pub(in crate::likelihood::kalman) fn spread_start(
     twin: &Composed,
     now: &Now<'_>,
     mean: &mut [f64],
