@@ -1,28 +1,29 @@
 //! Files that appear complete or not at all.
 
 pub(crate) use super::error::{folder, with_remedy};
-use super::unfinished::file_beside;
+use super::unfinished::{Unfinished, file_beside};
 use std::io::{self, Write};
 use std::path::Path;
+use tempfile::NamedTempFile;
 
 /// Writes a new file.
 pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let file = filled(path, bytes)?.persist_noclobber(path);
+    let file = filled(path, bytes)?.moved(|file| file.persist_noclobber(path));
     file.map(|_| ()).map_err(|error| error.error)
 }
 
 /// Writes a file, in place of an existing one.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let file = filled(path, bytes)?.persist(path);
+    let file = filled(path, bytes)?.moved(|file| file.persist(path));
     file.map(|_| ()).map_err(|error| error.error)
 }
 
 /// Creates a temporary file beside `path` with these bytes on the disk.
-fn filled(path: &Path, bytes: &[u8]) -> io::Result<tempfile::NamedTempFile> {
+fn filled(path: &Path, bytes: &[u8]) -> io::Result<Unfinished<NamedTempFile>> {
     let file = file_beside(path)?;
     // The error of the temporary file's own `write_all` would name that file.
-    file.as_file().write_all(bytes)?;
-    file.as_file().sync_all()?;
+    file.get().as_file().write_all(bytes)?;
+    file.get().as_file().sync_all()?;
     Ok(file)
 }
 

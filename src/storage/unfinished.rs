@@ -15,22 +15,61 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-/// Unfinished folders of this process, which are removed where it ends without unwinding.
+/// Unfinished files and folders of this process, which are removed where it ends without unwinding. Held while one is made, moved or removed.
 static MADE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn made_here() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     MADE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the unfinished folders of this process, which ends now.
+/// Removes what this process has not finished. The process ends now: no thread makes, moves or removes a file or folder afterwards.
 pub(crate) fn remove_unfinished() {
-    for path in made_here().iter() {
-        let _ = fs::remove_dir_all(path);
+    let made = made_here();
+    for path in made.iter() {
+        let _ = fs::remove_dir_all(path).or_else(|_| fs::remove_file(path));
+    }
+    std::mem::forget(made);
+}
+
+/// A file or folder among the unfinished ones of this process, until it is dropped or moved.
+#[derive(Debug)]
+pub(super) struct Unfinished<T: AsRef<Path>>(Option<T>);
+
+impl<T: AsRef<Path>> Unfinished<T> {
+    fn new(make: impl FnOnce() -> io::Result<T>) -> io::Result<Self> {
+        let mut made = made_here();
+        let new = make()?;
+        made.insert(new.as_ref().into());
+        Ok(Self(Some(new)))
+    }
+
+    pub(super) fn get(&self) -> &T {
+        self.0.as_ref().expect("neither dropped nor moved")
+    }
+
+    fn path(&self) -> &Path {
+        self.get().as_ref()
+    }
+
+    /// Lets `to` move it.
+    pub(super) fn moved<R>(mut self, to: impl FnOnce(T) -> R) -> R {
+        let mut made = made_here();
+        made.remove(self.path());
+        to(self.0.take().expect("neither dropped nor moved"))
+    }
+}
+
+impl<T: AsRef<Path>> Drop for Unfinished<T> {
+    fn drop(&mut self) {
+        let Some(one) = self.0.take() else { return };
+        let mut made = made_here();
+        made.remove(one.as_ref());
+        drop(one);
     }
 }
 
 /// Creates a locked temporary file beside `path`.
-pub(super) fn file_beside(path: &Path) -> io::Result<NamedTempFile> {
+pub(super) fn file_beside(path: &Path) -> io::Result<Unfinished<NamedTempFile>> {
     let mut builder = Builder::new();
     #[cfg(unix)]
     {
@@ -41,9 +80,9 @@ pub(super) fn file_beside(path: &Path) -> io::Result<NamedTempFile> {
     let prefix = prefix();
     builder.prefix(&prefix);
     loop {
-        let file = builder.tempfile_in(folder(path));
+        let file = Unfinished::new(|| builder.tempfile_in(folder(path)));
         let file = file.map_err(without_path)?;
-        if holds(file.as_file(), file.path()) {
+        if holds(file.get().as_file(), file.path()) {
             return Ok(file);
         }
     }
@@ -152,31 +191,13 @@ fn taken(place: &Path) -> StorageError {
     }
 }
 
-/// An entry among the unfinished folders of this process.
-#[derive(Debug)]
-struct UnfinishedEntry(PathBuf);
-
-impl UnfinishedEntry {
-    fn new(path: &Path) -> Self {
-        made_here().insert(path.into());
-        Self(path.into())
-    }
-}
-
-impl Drop for UnfinishedEntry {
-    fn drop(&mut self) {
-        made_here().remove(&self.0);
-    }
-}
-
 /// A folder that is filled beside its place and appears there complete.
 #[derive(Debug)]
 pub(crate) struct NewFolder {
     place: PathBuf,
     /// `true` where no other process may fill the place.
     is_claimed: bool,
-    _listed: UnfinishedEntry,
-    filling: TempDir,
+    filling: Unfinished<TempDir>,
     /// Its lock keeps sweeps away.
     _open: Option<File>,
 }
@@ -199,7 +220,7 @@ impl NewFolder {
         let place: &Path = &place.components().collect::<PathBuf>();
         loop {
             sweep_beside(place);
-            let filling = name.tempdir_in(folder(place));
+            let filling = Unfinished::new(|| name.tempdir_in(folder(place)));
             let filling = filling.map_err(|error| match error.kind() {
                 io::ErrorKind::AlreadyExists => taken(place),
                 _ => StorageError::io(place, without_path(error)),
@@ -210,7 +231,7 @@ impl NewFolder {
         }
     }
 
-    fn locked(place: &Path, filling: TempDir) -> Option<Self> {
+    fn locked(place: &Path, filling: Unfinished<TempDir>) -> Option<Self> {
         let open = File::open(filling.path()).ok();
         let is_lost = match &open {
             Some(file) => !holds(file, filling.path()),
@@ -218,13 +239,12 @@ impl NewFolder {
         };
         if is_lost {
             // Removed by a sweep; the name may be another process's by now.
-            let _ = filling.keep();
+            let _ = filling.moved(TempDir::keep);
             return None;
         }
         Some(Self {
             place: place.into(),
             is_claimed: false,
-            _listed: UnfinishedEntry::new(filling.path()),
             filling,
             _open: open,
         })
@@ -243,41 +263,45 @@ impl NewFolder {
 
     /// Moves the folder to its place. One that was claimed is kept beside a place that was taken meanwhile.
     pub fn finish(self) -> Result<(), StorageError> {
-        let failed = |error| StorageError::io(&self.place, error);
+        let Self {
+            place,
+            is_claimed,
+            filling,
+            ..
+        } = self;
+        let failed = |error| StorageError::io(&place, error);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             // A temporary folder is private; a result is like any other folder.
             let mode = fs::Permissions::from_mode(0o755);
-            fs::set_permissions(self.filling.path(), mode).map_err(failed)?;
+            fs::set_permissions(filling.path(), mode).map_err(failed)?;
         }
-        let moved = match fs::rename(self.filling.path(), &self.place) {
-            Err(error) if self.is_claimed => self.kept_beside().ok_or(error).map(Some),
-            moved => moved.map(|()| None),
-        };
-        let kept = moved.map_err(failed)?;
-        // Moved away: nothing is left to remove.
-        let _ = self.filling.keep();
-        match kept {
+        let kept = filling.moved(|from| {
+            let kept = match fs::rename(&from, &place) {
+                Err(error) if is_claimed => kept_beside(from.path(), &place).ok_or(error).map(Some),
+                moved => moved.map(|()| None),
+            }?;
+            // Moved away: nothing is left to remove.
+            let _ = from.keep();
+            Ok(kept)
+        });
+        match kept.map_err(failed)? {
             None => Ok(()),
-            Some(kept) => {
-                let place = self.place;
-                Err(StorageError::Kept { place, kept })
-            }
+            Some(kept) => Err(StorageError::Kept { place, kept }),
         }
     }
+}
 
-    /// Moves the folder to the first free of `out-2`, `out-3`, …
-    fn kept_beside(&self) -> Option<PathBuf> {
-        let numbered = |number: usize| {
-            let mut name = self.place.file_name()?.to_owned();
-            name.push(format!("-{number}"));
-            Some(self.place.with_file_name(name))
-        };
-        (2..100).filter_map(numbered).find(|path| {
-            path.symlink_metadata().is_err() && fs::rename(self.filling.path(), path).is_ok()
-        })
-    }
+/// Moves a folder to the first free of `out-2`, `out-3`, …
+fn kept_beside(folder: &Path, place: &Path) -> Option<PathBuf> {
+    let numbered = |number: usize| {
+        let mut name = place.file_name()?.to_owned();
+        name.push(format!("-{number}"));
+        Some(place.with_file_name(name))
+    };
+    let mut free = (2..100).filter_map(numbered);
+    free.find(|path| path.symlink_metadata().is_err() && fs::rename(folder, path).is_ok())
 }
 
 #[cfg(test)]
@@ -297,9 +321,10 @@ mod tests {
     #[test]
     fn a_new_folder_that_a_sweep_took_is_none() {
         let place = tempfile::tempdir().unwrap();
-        let taken = tempfile::tempdir_in(place.path()).unwrap();
+        let out = place.path().join("out");
+        let taken = Unfinished::new(|| tempfile::tempdir_in(place.path())).unwrap();
         fs::remove_dir(taken.path()).unwrap();
-        assert!(NewFolder::locked(&place.path().join("out"), taken).is_none());
+        assert!(NewFolder::locked(&out, taken).is_none());
     }
 
     #[test]
@@ -413,7 +438,10 @@ mod tests {
                 scope.spawn(|| (0..200).for_each(|_| sweep(place.path())));
                 scope.spawn(|| {
                     for _ in 0..200 {
-                        file_beside(&path).unwrap().persist(&path).unwrap();
+                        file_beside(&path)
+                            .unwrap()
+                            .moved(|file| file.persist(&path))
+                            .unwrap();
                     }
                 });
             }
