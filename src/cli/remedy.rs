@@ -100,9 +100,10 @@ impl Remedy for RecordError {
 impl Remedy for StorageError {
     fn remedy(&self) -> Option<String> {
         Some(match self {
-            Self::Taken { .. } | Self::OtherCall { .. } | Self::Busy(_) => {
-                "choose another --out".into()
-            }
+            Self::Taken { .. }
+            | Self::OtherCall { .. }
+            | Self::OtherVersion { .. }
+            | Self::Busy(_) => "choose another --out".into(),
             Self::Foreign { verb, .. } => format!("`truetwin {verb}` makes them"),
             Self::Threads { .. } => "--threads N takes fewer".into(),
             Self::NoMpi(_) => {

@@ -96,9 +96,11 @@ impl Base {
             Some(j) => sensors[j].clone(),
             None => name.to_owned(),
         };
-        let noisy = (space.iter())
-            .filter(|parameter| parameter.role == Role::Noise)
+        let own = (space.iter()).filter(|parameter| parameter.role == Role::Noise);
+        let following = measured.levels.iter().flat_map(|level| &level.following);
+        let noisy = own
             .map(|parameter| place(parameter.target()))
+            .chain(following.map(|level| level.state.clone()))
             .collect();
         Ok(Self {
             noisy,

@@ -207,7 +207,7 @@ fn values(
         }
         if p.role == Role::Noise {
             let level = levels.iter().find(|level| level.parameter.name == p.name);
-            noise.push(FittedNoise {
+            let own = FittedNoise {
                 name: p.target().to_owned(),
                 role: match level {
                     Some(level) if level.is_process => "process",
@@ -218,7 +218,17 @@ fn values(
                 std_error: errors[j],
                 declared: level.and_then(|level| level.declared),
                 at_bound: certificate.at_bound[j],
+            };
+            let following = level.map_or(&[][..], |level| &level.following);
+            let in_proportion = following.iter().map(|other| FittedNoise {
+                name: other.state.clone(),
+                unit: other.unit.clone(),
+                value: own.value * other.share,
+                std_error: own.std_error * other.share,
+                declared: other.declared,
+                ..own.clone()
             });
+            noise.extend(std::iter::once(own.clone()).chain(in_proportion));
             continue;
         }
         parameters.push(FittedValue {

@@ -216,6 +216,8 @@ fn levels(fit: &Fit) -> Vec<Block> {
         ]
     };
     let several = fit.starts.iter().any(|start| start.record > 1);
+    // A start that is known needs no line.
+    let estimated = (fit.starts.iter()).filter(|start| start.std_error > 0.0);
     let start = |start: &FittedStart| {
         let record = match several {
             true => format!(" (record {})", start.record),
@@ -237,7 +239,7 @@ fn levels(fit: &Fit) -> Vec<Block> {
     let head_of_starts = [("start of", Text), value, error, ("unit", Text)];
     let tables: [(&[_], Vec<_>); 2] = [
         (&head, fit.noise.iter().map(noise).collect()),
-        (&head_of_starts, fit.starts.iter().map(start).collect()),
+        (&head_of_starts, estimated.map(start).collect()),
     ];
     let filled = tables.into_iter().filter(|(_, rows)| !rows.is_empty());
     filled

@@ -83,6 +83,17 @@ pub enum StorageError {
         /// First difference between the calls.
         difference: String,
     },
+    /// A folder whose work this version cannot go on with.
+    #[error(
+        "{} holds the work of another version of truetwin ({difference}), which alone can go on with it; choose another folder, or remove it",
+        path.display()
+    )]
+    OtherVersion {
+        /// Folder.
+        path: PathBuf,
+        /// Layout or version, then and now.
+        difference: String,
+    },
     /// An output that another process is writing.
     #[error(
         "another run is writing to {}; wait until it is done or stop it, or choose another place",

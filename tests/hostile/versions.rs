@@ -129,7 +129,7 @@ fn folders_of_work_are_refused_with_the_remedy() {
             "paper",
         ),
     ] {
-        let parts = [name, "holds the work of another call", "choose another"];
+        let parts = [name, "of another version of truetwin", "choose another"];
         refused(at, &format!("{call} --out {name}"), &parts);
     }
 }

@@ -14,6 +14,9 @@ numbers! {
         /// Standard deviation of the logarithm of a level that nothing is declared of: within a factor of 50 at two of them. Half of it ties
         /// rigs to this file's guesses of size; twice costs a nat a level, for all explanations alike.
         undeclared: f64 = 2.0,
+        /// States up to which each has a level of its own. More share one factor: a record tells few levels of many hidden states, and each costs
+        /// a pass of every score. Half of it ties models of five states; twice makes fits of sixteen states three times as long.
+        apart: usize = 8,
         /// Guess of an undeclared process noise: over the record, a random walk of this share of the state's own motion.
         wander: f64 = 0.1,
         /// Guess of an undeclared measurement noise, as a share of the output's deviation.
@@ -103,6 +106,19 @@ pub(crate) struct Level {
     pub deviation: f64,
     /// Where fits begin.
     pub loud: f64,
+    /// Further states whose level is in proportion.
+    pub following: Vec<FollowingLevel>,
+}
+
+/// A level in proportion to that of another state.
+#[derive(Debug, Clone)]
+pub(crate) struct FollowingLevel {
+    pub state: String,
+    pub unit: String,
+    /// Level that is declared, in this unit.
+    pub declared: Option<f64>,
+    /// This level over the other.
+    pub share: f64,
 }
 
 /// A twin with noise levels in θ, behind its own parameters.
@@ -139,6 +155,82 @@ fn ranges(median: f64, deviation: f64, floor: f64) -> [Interval; 2] {
     })
 }
 
+/// What is known of a level before the records are seen.
+struct Guess<'a> {
+    name: &'a str,
+    unit: String,
+    /// Least level that the records can tell.
+    floor: f64,
+    /// Zero where nothing is declared.
+    declared: f64,
+    /// Used where nothing is declared.
+    guessed: f64,
+    loud: f64,
+}
+
+impl Guess<'_> {
+    fn median(&self) -> f64 {
+        let is_declared = self.declared > 0.0;
+        let median = if is_declared {
+            self.declared
+        } else {
+            self.guessed
+        };
+        // The least level that the record can tell stands for a declared one below it.
+        median.max(self.floor)
+    }
+
+    /// The level as a parameter, of a state or of an output.
+    fn level(&self, beliefs: &Beliefs, is_process: bool) -> Level {
+        let (declared, median) = (self.declared_level(), self.median());
+        let deviation = match declared {
+            Some(_) => beliefs.factors.get(self.name).map_or(1.0, |f| f.ln()),
+            None => MEASURED.undeclared,
+        };
+        let [prior, bounds] = ranges(median, deviation, self.floor);
+        let parameter = Parameter {
+            name: Role::Noise.name(self.name),
+            unit: self.unit.clone(),
+            prior,
+            bounds,
+            role: Role::Noise,
+        };
+        Level {
+            parameter,
+            is_process,
+            declared,
+            median,
+            deviation,
+            loud: bounds.clamp(self.loud.max(median)),
+            following: vec![],
+        }
+    }
+
+    fn declared_level(&self) -> Option<f64> {
+        (self.declared > 0.0).then_some(self.declared)
+    }
+}
+
+/// The state that each of many takes its level from, by index: of those declared, or of the others, the one with the largest level. A state
+/// whose factor the study says has its own.
+fn leaders(guesses: &[Option<Guess<'_>>], beliefs: &Beliefs) -> Vec<Option<usize>> {
+    if guesses.iter().flatten().count() <= MEASURED.apart {
+        return vec![None; guesses.len()];
+    }
+    let is_tied = |guess: &&Guess<'_>| !beliefs.factors.contains_key(guess.name);
+    let tied = |i: usize| guesses[i].as_ref().filter(is_tied);
+    let leader = |declared: bool| {
+        let of_kind = |i: &usize| tied(*i).is_some_and(|g| (g.declared > 0.0) == declared);
+        let median = |i: &usize| guesses[*i].as_ref().map_or(0.0, Guess::median);
+        let all = (0..guesses.len()).filter(of_kind);
+        all.max_by(|a, b| median(a).total_cmp(&median(b)))
+    };
+    let leaders = [false, true].map(leader);
+    (0..guesses.len())
+        .map(|i| leaders[usize::from(tied(i)?.declared > 0.0)].filter(|leader| *leader != i))
+        .collect()
+}
+
 /// The twin with these sizes of states and outputs.
 pub(super) fn build(
     base: &Composed,
@@ -147,93 +239,98 @@ pub(super) fn build(
     beliefs: &Beliefs,
     sizes: &RecordSizes,
 ) -> Measured {
-    let RecordSizes {
-        states: motion,
-        outputs,
-        declared,
-        starts: widths,
-    } = sizes;
-    let (n, p) = (outline.states.len(), outline.outputs.len());
-    let mut noisy = FittedLevels {
-        step: beliefs.step,
-        process: vec![LevelSource::Declared; n],
-        measurement: vec![LevelSource::Declared; p],
-    };
-    let mut starts = vec![];
-    let twin = Twin::Equations(base.clone());
     let step = records[0].drive().dt();
     let longest = records.iter().map(Record::samples).max().unwrap_or(1) as f64 * step;
-    let mut levels = Vec::new();
-    let mut add = |name: &str, unit: String, floor: f64, declared: f64, guess: f64, loud: f64| {
-        let is_process = floor == 0.0;
-        let role_name = Role::Noise.name(name);
-        if beliefs.known.contains(name) || outline.parameters.position(&role_name).is_ok() {
-            return None;
-        }
-        let (median, deviation) = if declared > 0.0 {
-            (declared, beliefs.factors.get(name).map_or(1.0, |f| f.ln()))
-        } else {
-            (guess, MEASURED.undeclared)
-        };
-        // The least level that the record can tell stands for a declared one below it.
-        let median = median.max(floor);
-        let [prior, bounds] = ranges(median, deviation, floor);
-        let parameter = Parameter {
-            name: role_name,
-            unit,
-            prior,
-            bounds,
-            role: Role::Noise,
-        };
-        levels.push(Level {
-            parameter,
-            is_process,
-            declared: (declared > 0.0).then_some(declared),
-            median,
-            deviation,
-            loud: bounds.clamp(loud.max(median)),
-        });
-        Some(twin.entries() + levels.len() - 1)
+    let is_fitted = |name: &str| {
+        let has_own = outline.parameters.position(&Role::Noise.name(name)).is_ok();
+        !beliefs.known.contains(name) && !has_own
     };
-    for (i, state) in outline.states.iter().enumerate() {
-        if is_memory(&state.name) {
+    let of_state = |i: usize| {
+        let (state, motion) = (&outline.states[i], sizes.states[i]);
+        let unit = state.unit.as_str();
+        let guess = || Guess {
+            name: &state.name,
+            unit: format!("{}/√s", if unit.is_empty() { "1" } else { unit }),
+            floor: 0.0,
+            declared: sizes.declared.process[i] / beliefs.step.sqrt(),
+            guessed: MEASURED.wander * motion / longest.sqrt(),
+            loud: MEASURED.loud * motion / step.sqrt(),
+        };
+        (!is_memory(&state.name) && is_fitted(&state.name)).then(guess)
+    };
+    let of_output = |j: usize| {
+        let (output, size) = (&outline.outputs[j], sizes.outputs[j]);
+        let has_end = |record: &Record| stops(&record.outputs().column(j).to_vec());
+        let guess = || Guess {
+            name: &output.name,
+            unit: output.unit.clone(),
+            floor: match records.iter().any(has_end) {
+                true => MEASURED.stopped * size,
+                false => f64::MIN_POSITIVE,
+            },
+            declared: sizes.declared.measurement[j],
+            guessed: MEASURED.share * size,
+            loud: MEASURED.loud * size,
+        };
+        is_fitted(&output.name).then(guess)
+    };
+    let states: Vec<_> = (0..outline.states.len()).map(of_state).collect();
+    let outputs: Vec<_> = (0..outline.outputs.len()).map(of_output).collect();
+    let leaders = leaders(&states, beliefs);
+
+    let twin = Twin::Equations(base.clone());
+    let first = twin.entries();
+    let mut levels: Vec<Level> = vec![];
+    let mut fitted = |guess: &Option<Guess<'_>>, is_process: bool| match guess {
+        None => LevelSource::Declared,
+        Some(guess) => {
+            levels.push(guess.level(beliefs, is_process));
+            LevelSource::Fitted {
+                entry: first + levels.len() - 1,
+                declared: guess.declared,
+            }
+        }
+    };
+    let mut process: Vec<LevelSource> = (states.iter().zip(&leaders))
+        .map(|(guess, leader)| match leader {
+            None => fitted(guess, true),
+            Some(_) => LevelSource::Declared,
+        })
+        .collect();
+    let measurement = outputs.iter().map(|guess| fitted(guess, false)).collect();
+    for (i, (guess, leader)) in states.iter().zip(leaders).enumerate() {
+        let Some((guess, leader)) = guess.as_ref().zip(leader) else {
             continue;
-        }
-        let unit = if state.unit.is_empty() {
-            "1/√s".to_owned()
-        } else {
-            format!("{}/√s", state.unit)
         };
-        let declared = declared.process[i] / beliefs.step.sqrt();
-        let guess = MEASURED.wander * motion[i] / longest.sqrt();
-        let loud = MEASURED.loud * motion[i] / step.sqrt();
-        if let Some(entry) = add(&state.name, unit, 0.0, declared, guess, loud) {
-            noisy.process[i] = LevelSource::Fitted { entry, declared };
-        }
-        if let Some(std) = widths[i] {
-            starts.push(TwinPart::UncertainStart { state: i, std });
+        if let LevelSource::Fitted { entry, declared } = process[leader] {
+            let level = &mut levels[entry - first];
+            let share = guess.median() / level.median;
+            level.following.push(FollowingLevel {
+                state: guess.name.to_owned(),
+                unit: guess.unit.clone(),
+                declared: guess.declared_level(),
+                share,
+            });
+            process[i] = match declared > 0.0 {
+                true => LevelSource::Fitted { entry, declared },
+                false => LevelSource::Follows { entry, share },
+            };
         }
     }
-    for (j, output) in outline.outputs.iter().enumerate() {
-        let (guess, loud) = (MEASURED.share * outputs[j], MEASURED.loud * outputs[j]);
-        let unit = output.unit.clone();
-        let stops = records
-            .iter()
-            .any(|r| stops(&r.outputs().column(j).to_vec()));
-        let floor = if stops {
-            MEASURED.stopped * outputs[j]
-        } else {
-            f64::MIN_POSITIVE
-        };
-        let declared = declared.measurement[j];
-        if let Some(entry) = add(&output.name, unit, floor, declared, guess, loud) {
-            noisy.measurement[j] = LevelSource::Fitted { entry, declared };
-        }
-    }
+    let widths = sizes.starts.iter().enumerate();
+    let starts = widths.filter_map(|(state, std)| {
+        let is_memory = is_memory(&outline.states[state].name);
+        let std = std.filter(|_| !is_memory)?;
+        Some(TwinPart::UncertainStart { state, std })
+    });
+    let noisy = TwinPart::Levels(FittedLevels {
+        step: beliefs.step,
+        process,
+        measurement,
+    });
     let parameters = levels.iter().map(|level| level.parameter.clone());
-    starts.push(TwinPart::Levels(noisy));
     Measured {
-        twin: twin.with(parameters, starts),
+        twin: twin.with(parameters, starts.chain([noisy]).collect()),
         levels,
         is_silent: false,
         elsewhere: None,

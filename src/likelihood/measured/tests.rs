@@ -5,7 +5,7 @@ use super::*;
 use crate::likelihood::kalman::{FilterSettings, Kalman};
 use crate::math::deviation;
 use crate::record::{Drive, Signal};
-use crate::twin::{DigitalTwin, Noise, Now};
+use crate::twin::{DigitalTwin, Noise, Now, Outline, Parameter, StateSpace};
 use crate::twins::{CascadedTanks, VanDerPol};
 
 fn record(twin: &dyn DigitalTwin, theta: &[f64], drive: Drive) -> Record {
@@ -181,10 +181,10 @@ fn levels_are_put_in_the_place_of_the_twins_own() {
 /// A level that halves while a tank runs empty, read with an error of a twentieth of the level.
 struct Reading;
 
-impl crate::twin::StateSpace for Reading {
-    fn outline(&self) -> crate::twin::Outline {
-        crate::twin::Outline::new()
-            .parameter(crate::twin::Parameter::new("k", "1/s", 0.5, 1.5))
+impl StateSpace for Reading {
+    fn outline(&self) -> Outline {
+        Outline::new()
+            .parameter(Parameter::new("k", "1/s", 0.5, 1.5))
             .state("x", "V")
             .output("y", "V")
     }
@@ -249,4 +249,91 @@ fn a_contradicted_start_stands_where_it_explains_enough() {
     assert_eq!(better(Some(4.1)), (Some(4.1), true));
     assert_eq!(better(Some(3.9)), (Some(1.0), false));
     assert_eq!(better(None), (Some(1.0), false));
+}
+
+/// Ten rooms in a row; half of them declare a noise, each twice that of the one before.
+#[derive(Debug)]
+struct Row;
+
+impl Row {
+    const STATES: usize = 10;
+
+    fn declared(state: usize) -> f64 {
+        if state < Self::STATES / 2 {
+            0.0
+        } else {
+            0.001 * f64::from(1 << state)
+        }
+    }
+}
+
+impl StateSpace for Row {
+    fn outline(&self) -> Outline {
+        let parameter = Parameter::new("a", "1/s", 0.5, 2.0);
+        let outline = Outline::new().parameter(parameter).output("y", "K");
+        (0..Self::STATES).fold(outline, |all, i| all.state(&format!("T{i}"), "K"))
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        for i in 0..x.len() {
+            let before = if i == 0 { 1.0 } else { x[i - 1] };
+            dx[i] = now.theta[0] * (before - x[i]);
+        }
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y[0] = x[2];
+    }
+    fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
+        for (i, level) in process.iter_mut().enumerate() {
+            *level = Self::declared(i);
+        }
+        measurement[0] = 0.01;
+    }
+}
+
+/// Beyond eight states the levels of those that declare one are in proportion, and so are the guessed ones; what the study says of a state is
+/// its own.
+#[test]
+fn levels_of_many_states_share_a_factor() {
+    let record = record(&Row, &[1.0], Drive::autonomous(0.5, 100).unwrap());
+    let held = Beliefs {
+        factors: [("T6".to_owned(), 2.0)].into(),
+        ..beliefs(0.5)
+    };
+    let twin = Composed::from(Row);
+    let measured = measured_equations(&twin, std::slice::from_ref(&record), &held).unwrap();
+    let targets: Vec<&str> = (measured.levels.iter())
+        .map(|level| level.parameter.target())
+        .collect();
+    let [guessed, own, declared, output] = targets[..] else {
+        panic!("{targets:?}")
+    };
+    assert_eq!((own, declared, output), ("T6", "T9", "y"));
+    assert!(guessed < "T5");
+    let following = measured.levels.iter().map(|level| level.following.len());
+    assert_eq!(following.collect::<Vec<_>>(), [4, 0, 3, 0]);
+    let equations = measured.twin.equations().unwrap();
+    let noise = |factors: [f64; 3]| {
+        let factors = factors.into_iter().chain([1.0]);
+        let levels = medians(&measured)
+            .zip(factors)
+            .map(|(median, f)| median * f);
+        let theta: Vec<f64> = [1.0].into_iter().chain(levels).collect();
+        let (mut process, mut measurement) = ([0.0; Row::STATES], [0.0]);
+        let now = Now::new(0.0, 0.5, &[], &theta);
+        equations.noise(&now, &[0.0; Row::STATES], &mut process, &mut measurement);
+        process
+    };
+    let (centre, changed) = (noise([1.0; 3]), noise([3.0, 5.0, 7.0]));
+    for i in 0..Row::STATES {
+        let factor = match i {
+            ..5 => 3.0,
+            6 => 5.0,
+            _ => 7.0,
+        };
+        assert!((changed[i] / centre[i] / factor - 1.0).abs() < 1e-12, "{i}");
+        if i >= 5 {
+            assert!((centre[i] / Row::declared(i) - 1.0).abs() < 1e-12, "{i}");
+        }
+        assert!(equations.fits_noise_of(i));
+    }
 }

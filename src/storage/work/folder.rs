@@ -79,7 +79,10 @@ impl WorkFolder {
             Err(reason) => Err(StorageError::Taken { path, verb, reason }),
             Ok(kept) => match manifest.differs(&kept) {
                 None => Ok(Self::of(path, kept)),
-                Some(difference) => Err(StorageError::OtherCall { path, difference }),
+                Some(difference) => Err(match manifest.is_of_version(&kept) {
+                    true => StorageError::OtherCall { path, difference },
+                    false => StorageError::OtherVersion { path, difference },
+                }),
             },
         }
     }
@@ -278,6 +281,25 @@ mod tests {
         fs::write(&file, "[1, ").unwrap();
         let error = again.kept("runs", 1, any).unwrap_err().to_string();
         assert!(error.contains("remove it"), "{error}");
+    }
+
+    /// No call of this version can go on with it: the message asks for none.
+    #[test]
+    fn work_of_another_layout_is_not_to_be_resumed() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("work");
+        open(&path, 2).unwrap();
+        let refused = |manifest| WorkFolder::resume(&path, &manifest).unwrap_err();
+        let of_call = refused(manifest(3));
+        let of_version = refused(Manifest::new("reproduce", 2).with("runs", 3));
+        assert!(
+            matches!(of_call, StorageError::OtherCall { .. }),
+            "{of_call}"
+        );
+        assert!(
+            matches!(of_version, StorageError::OtherVersion { .. }),
+            "{of_version}"
+        );
     }
 
     /// Another number in a piece, or a piece of another folder, is refused by name.

@@ -11,6 +11,10 @@ use std::path::Path;
 pub(super) const CHECKSUMS: &str = "checksums";
 /// Entry of the file alone: the checksum of all others but that one.
 const OWN: &str = "sha256";
+/// Entry of verb and layout.
+const LAYOUT: &str = "schema";
+/// Entry of the program's version.
+const VERSION: &str = "version";
 /// Longest value that a message shows, in characters.
 const SHORT: usize = 40;
 
@@ -26,8 +30,8 @@ impl Manifest {
     pub fn new(verb: &'static str, layout: u32) -> Self {
         let entries = Map::new();
         Self { verb, entries }
-            .with("schema", format!("truetwin.{verb}-folder/{layout}"))
-            .with("version", env!("CARGO_PKG_VERSION"))
+            .with(LAYOUT, format!("truetwin.{verb}-folder/{layout}"))
+            .with(VERSION, env!("CARGO_PKG_VERSION"))
     }
 
     /// Adds an entry.
@@ -85,7 +89,7 @@ impl Manifest {
                 excerpt(&error.to_string())
             )
         })?;
-        let schema = entries.get("schema").and_then(Value::as_str);
+        let schema = entries.get(LAYOUT).and_then(Value::as_str);
         let maker = schema
             .and_then(|schema| schema.strip_prefix("truetwin.")?.split_once("-folder/"))
             .map(|(maker, _)| maker);
@@ -104,6 +108,13 @@ impl Manifest {
             Some(other) => Err(format!("it is a {} folder", excerpt(other))),
             None => Err("its manifest.json has another schema".into()),
         }
+    }
+
+    /// Tells whether the `kept` manifest is of the same version of the program, and of the same layout.
+    pub fn is_of_version(&self, kept: &Self) -> bool {
+        [LAYOUT, VERSION]
+            .iter()
+            .all(|key| kept.get(key) == self.get(key))
     }
 
     /// Returns the first difference from the `kept` manifest in words, finished or not; `None` if there is none.

@@ -131,6 +131,14 @@ impl Composed {
             .collect()
     }
 
+    /// Returns whether a record fits the noise level of this state.
+    pub(crate) fn fits_noise_of(&self, state: usize) -> bool {
+        self.parts.list.iter().any(|added| match &added.part {
+            TwinPart::Levels(levels) => !matches!(levels.process[state], LevelSource::Declared),
+            _ => false,
+        })
+    }
+
     /// Returns the integrator.
     pub(crate) fn integrator(&self) -> Integrator {
         self.parts.integrator

@@ -90,6 +90,7 @@ impl FittedLevels {
                     *level * per_step * (now.theta[entry] / declared)
                 }
                 LevelSource::Fitted { entry, .. } => now.theta[entry] * per_second,
+                LevelSource::Follows { entry, share } => now.theta[entry] * share * per_second,
             };
         }
         for (level, source) in measurement.iter_mut().zip(&self.measurement) {
@@ -99,6 +100,7 @@ impl FittedLevels {
                     *level *= now.theta[entry] / declared;
                 }
                 LevelSource::Fitted { entry, .. } => *level = now.theta[entry],
+                LevelSource::Follows { entry, share } => *level = now.theta[entry] * share,
             }
         }
     }

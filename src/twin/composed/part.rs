@@ -278,6 +278,8 @@ pub(crate) enum LevelSource {
     Declared,
     /// An entry of θ; the twin's own level, in the parameter's unit, says how it depends on time and θ.
     Fitted { entry: usize, declared: f64 },
+    /// A share of an entry of θ, the level of another state.
+    Follows { entry: usize, share: f64 },
 }
 
 /// Noise levels of states and outputs that a record fits.
