@@ -6,7 +6,8 @@
 //!
 //! ```text
 //! z_s = (mean T_s of the measured records − mean T_s of simulated ones)/deviation of simulated ones
-//! p   = share of simulated records with max_s as large: of |z_s|, of z_s where less than usual is no fault (tails, bursts, correlation)
+//! p   = share of simulated records with max_s as large: of |z_s|, of z_s where less than usual is no fault (bursts, correlation); tails are
+//!       told, and no fault
 //! ```
 //!
 //! The largest z has its own distribution here, so the number of statistics does not matter. Simulations end early where many have as

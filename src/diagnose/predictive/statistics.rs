@@ -60,13 +60,13 @@ impl Discrepancy {
         all
     }
 
-    /// Departure from simulated records that counts, from the distance to their mean in standard deviations: readings that are rounded have
-    /// light tails, and what is less correlated than noise is no gap.
+    /// Departure from simulated records that counts, from the distance to their mean in standard deviations: what is less correlated than
+    /// noise is no gap, and neither are tails. Independent noise may have any; what comes in bursts or moves predictions shows elsewhere.
     pub fn departure(&self, deviations: f64) -> f64 {
         match self {
             Self::Spread(_) | Self::Error(..) => deviations.abs(),
-            Self::Whiteness { counts: false, .. } => 0.0,
-            Self::Whiteness { .. } | Self::Tails(_) | Self::Bursts(_) => deviations.max(0.0),
+            Self::Whiteness { counts: false, .. } | Self::Tails(_) => 0.0,
+            Self::Whiteness { .. } | Self::Bursts(_) => deviations.max(0.0),
         }
     }
 

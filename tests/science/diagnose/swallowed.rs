@@ -32,26 +32,39 @@ fn quick(record: Record) -> Diagnosis {
     with_settings(&study("van-der-pol"), record, &settings)
 }
 
-/// Bursts are called, with their place and times.
-fn bursts_are_called(seeds: u64) {
+/// An oscillator whose second state is pushed at random three times for half a second.
+fn pushed(seed: u64) -> Diagnosis {
+    let mut source = Noise::new(71, "bursts", seed).source("push");
+    let mut left = 0;
+    quick(oscillator(1.1, |k| {
+        left = if k % 90 == 45 { 10 } else { left - 1 };
+        let force = if left > 0 { 1.5 * STEP } else { 0.0 };
+        (force + DECLARED) * source.normal()
+    }))
+}
+
+/// Bursts are called, with their place and times; one place in `spared` records may be another.
+fn bursts_are_called(seeds: u64, spared: usize) {
+    let mut elsewhere = vec![];
     for seed in 0..seeds {
-        let mut source = Noise::new(71, "bursts", seed).source("push");
-        let mut left = 0;
-        let record = oscillator(1.1, |k| {
-            // Three bursts of half a second.
-            left = if k % 90 == 45 { 10 } else { left - 1 };
-            let force = if left > 0 { 1.5 * STEP } else { 0.0 };
-            (force + DECLARED) * source.normal()
-        });
-        let found = quick(record);
-        let Some(check) = &found.check else {
-            panic!("{seed}: bursts are explained: {}", line("bursts", &found));
-        };
-        assert_eq!(found.verdict, Verdict::StructuralGap, "{seed}: {check:?}");
-        assert_eq!(found.cause.decision, Decision::NoneOfThese);
+        let found = pushed(seed);
+        let told = line("bursts", &found);
+        assert_eq!(found.verdict, Verdict::StructuralGap, "{seed}: {told}");
+        assert_eq!(
+            found.cause.decision,
+            Decision::NoneOfThese,
+            "{seed}: {told}"
+        );
         assert!(found.cause.probabilities.nothing < 0.5);
-        let disturbance = check.disturbance.as_ref().unwrap();
-        assert_eq!(found.location.target.as_deref(), Some("x2"), "{seed}");
+        if found.location.target.as_deref() != Some("x2") {
+            elsewhere.push(format!("{seed}: {told}"));
+            continue;
+        }
+        // None where an unknown function takes the bursts up.
+        let check = found.check.as_ref();
+        let Some(disturbance) = check.and_then(|check| check.disturbance.as_ref()) else {
+            continue;
+        };
         assert_eq!(disturbance.place, "x2");
         assert!(disturbance.size > disturbance.expected, "{seed}");
         let is_near =
@@ -61,18 +74,57 @@ fn bursts_are_called(seeds: u64) {
             "{disturbance:?}"
         );
     }
+    assert!(elsewhere.len() <= spared, "{elsewhere:#?}");
 }
 
 /// Two records: a version that takes bursts for noise half of the time fails in three of four seeds.
 #[test]
 fn bursts_of_a_force_are_no_noise() {
-    bursts_are_called(2);
+    bursts_are_called(2, 0);
 }
 
 #[test]
 #[ignore = "half a minute; run it in release"]
 fn bursts_of_a_force_are_no_noise_in_many_records() {
-    bursts_are_called(12);
+    bursts_are_called(12, 1);
+}
+
+/// Independent pushes of Student's t distribution, their variance as declared, are noise: at most one of these records is a gap.
+fn heavy_tails(freedom: usize, seeds: u64) {
+    let mut called = vec![];
+    for seed in 0..seeds {
+        let mut source = Noise::new(73, "tails", seed).source("push");
+        let size = DECLARED * ((freedom - 2) as f64 / freedom as f64).sqrt();
+        let found = quick(oscillator(1.2, |_| {
+            let squares: f64 = (0..freedom).map(|_| source.normal().powi(2)).sum();
+            size * source.normal() / (squares / freedom as f64).sqrt()
+        }));
+        if found.verdict == Verdict::StructuralGap {
+            called.push(format!(
+                "{seed}: {} {:?}",
+                line("tails", &found),
+                found.check
+            ));
+        }
+    }
+    assert!(
+        called.len() <= 1,
+        "{} of {seeds}: {called:#?}",
+        called.len()
+    );
+}
+
+/// Three records: a check that takes tails for a disturbance calls two of three.
+#[test]
+fn noise_with_heavy_tails_is_no_gap() {
+    heavy_tails(3, 3);
+}
+
+#[test]
+#[ignore = "two minutes; run it in release"]
+fn noise_with_heavy_tails_is_no_gap_in_many_records() {
+    heavy_tails(3, 30);
+    heavy_tails(5, 30);
 }
 
 /// No gap under noise of this level and of this correlation from a sample to the next.
