@@ -8,6 +8,7 @@ pub(super) use crate::cli::output;
 pub(super) use crate::cli::provenance::Provenance;
 pub(super) use crate::cli::records;
 pub(super) use crate::storage::NewFolder;
+pub(super) use crate::storage::files::write_result;
 pub(super) use crate::study::Study;
 pub(super) use clap::Args;
 pub(super) use serde_json::{Value, json};

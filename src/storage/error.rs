@@ -35,12 +35,12 @@ pub enum StorageError {
     /// Something at the place of an unfinished folder that this program has not put there.
     #[error("{} is in the way, and is no unfinished work of this program; remove it", .0.display())]
     InTheWay(PathBuf),
-    /// A finished folder whose place was taken while it was made.
+    /// A finished result whose place was taken while it was made.
     #[error("{} was taken while the work went on; the result is in {}", place.display(), kept.display())]
     Kept {
         /// Output.
         place: PathBuf,
-        /// Where the folder is.
+        /// Where the result is.
         kept: PathBuf,
     },
     /// A path that a file keeps as text, which it is not.
@@ -94,6 +94,11 @@ pub enum StorageError {
         /// Layout or version, then and now.
         difference: String,
     },
+    /// Work that would not be the same if it were resumed.
+    #[error(
+        "two simulations with one seed differ, so that no work on them can be resumed; take all randomness from the seed, and none from clocks or addresses"
+    )]
+    Unrepeatable,
     /// An output that another process is writing.
     #[error(
         "another run is writing to {}; wait until it is done or stop it, or choose another place",

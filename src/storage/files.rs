@@ -1,6 +1,8 @@
 //! Files that appear complete or not at all.
 
+use super::StorageError;
 pub(crate) use super::error::{folder, with_remedy};
+use super::names::places_beside;
 use super::unfinished::{Unfinished, file_beside};
 use std::io::{self, Write};
 use std::path::Path;
@@ -10,6 +12,27 @@ use tempfile::NamedTempFile;
 pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let file = filled(path, bytes)?.moved(|file| file.persist_noclobber(path));
     file.map(|_| ()).map_err(|error| error.error)
+}
+
+/// Writes a result whose place was free when the work began. What has taken it since stays: the result is kept beside it, which the error
+/// says.
+pub(crate) fn write_result<E: From<StorageError>>(
+    place: &Path,
+    write: impl Fn(&Path) -> Result<(), E>,
+) -> Result<(), E> {
+    let is_free = |path: &Path| path.symlink_metadata().is_err();
+    let written = write(place);
+    if written.is_ok() || is_free(place) {
+        return written;
+    }
+    let kept = places_beside(place).find(|path| is_free(path) && write(path).is_ok());
+    match kept {
+        None => written,
+        Some(kept) => {
+            let place = place.into();
+            Err(StorageError::Kept { place, kept }.into())
+        }
+    }
 }
 
 /// Writes a file, in place of an existing one.
@@ -31,6 +54,20 @@ fn filled(path: &Path, bytes: &[u8]) -> io::Result<Unfinished<NamedTempFile>> {
 mod tests {
     use super::*;
     use std::fs;
+
+    #[test]
+    fn a_result_is_kept_beside_what_has_taken_its_place() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("r.csv");
+        let write =
+            |path: &Path| write_new(path, b"result").map_err(|error| StorageError::io(path, error));
+        write_result(&path, write).unwrap();
+        fs::write(&path, "another's").unwrap();
+        let error = write_result(&path, write).unwrap_err().to_string();
+        assert!(error.contains("r-2.csv"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"another's");
+        assert_eq!(fs::read(place.path().join("r-2.csv")).unwrap(), b"result");
+    }
 
     #[test]
     fn a_new_file_is_whole_readable_and_never_in_place_of_another() {

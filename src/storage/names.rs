@@ -39,6 +39,25 @@ pub(super) fn is_unfinished(name: &str) -> bool {
             .is_some_and(|(process, random)| is_number(process) && is_random(random))
 }
 
+/// The places beside one that is taken: `out-2`, `out-3`, … for `out`, `r-2.csv`, … for `r.csv`.
+pub(super) fn places_beside(place: &Path) -> impl Iterator<Item = PathBuf> {
+    let [stem, ending] = [place.file_stem(), place.extension()].map(Option::unwrap_or_default);
+    (2..100).map(move |number| {
+        let mut name = stem.to_owned();
+        name.push(format!("-{number}"));
+        let path = place.with_file_name(name);
+        match ending.is_empty() {
+            true => path,
+            false => {
+                let mut path = path.into_os_string();
+                path.push(".");
+                path.push(ending);
+                path.into()
+            }
+        }
+    })
+}
+
 /// The unfinished folder that one process at a time may have for a place.
 pub(super) fn named(place: &Path) -> PathBuf {
     let name = place.file_name().unwrap_or_default();

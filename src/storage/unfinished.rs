@@ -7,7 +7,7 @@
 
 use super::StorageError;
 use super::error::folder;
-use super::names::{is_unfinished, named, prefix};
+use super::names::{is_unfinished, named, places_beside, prefix};
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -63,8 +63,11 @@ impl<T: AsRef<Path>> Drop for Unfinished<T> {
     fn drop(&mut self) {
         let Some(one) = self.0.take() else { return };
         let mut made = made_here();
-        made.remove(one.as_ref());
+        let path = one.as_ref().to_owned();
+        made.remove(&path);
         drop(one);
+        // Where no file can be opened, a whole folder is not removed.
+        let _ = remove_one_by_one(&path);
     }
 }
 
@@ -293,15 +296,11 @@ impl NewFolder {
     }
 }
 
-/// Moves a folder to the first free of `out-2`, `out-3`, …
+/// Moves a folder to the first free place beside one that is taken.
 fn kept_beside(folder: &Path, place: &Path) -> Option<PathBuf> {
-    let numbered = |number: usize| {
-        let mut name = place.file_name()?.to_owned();
-        name.push(format!("-{number}"));
-        Some(place.with_file_name(name))
-    };
-    let mut free = (2..100).filter_map(numbered);
-    free.find(|path| path.symlink_metadata().is_err() && fs::rename(folder, path).is_ok())
+    let is_moved =
+        |path: &PathBuf| path.symlink_metadata().is_err() && fs::rename(folder, path).is_ok();
+    places_beside(place).find(is_moved)
 }
 
 #[cfg(test)]

@@ -15,6 +15,9 @@ impl Study {
     pub fn manifest(&self, verb: &'static str, layout: u32) -> Result<Manifest, StorageError> {
         // It reads the input files, whose checksums are of what was read last.
         let simulation = self.simulation();
+        if simulation != self.simulation() {
+            return Err(StorageError::Unrepeatable);
+        }
         let space = self.twin().parameters();
         let parameters: Vec<Value> = (space.iter())
             .map(|p| json!({ "name": p.name, "prior": p.prior, "bounds": p.bounds }))
@@ -78,6 +81,32 @@ mod tests {
     fn tanks(high: f64) -> Study {
         let plan = RecordPlan::levels(0.5, 40, 0.0, high, 5);
         Study::new("tanks", CascadedTanks, plan).unwrap()
+    }
+
+    /// A simulator with a memory beside its seed.
+    #[derive(Debug)]
+    struct Counter(AtomicU64);
+
+    impl DigitalTwin for Counter {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("k", "1", 0.0, 1.0)])
+        }
+        fn signals(&self) -> Signals {
+            CascadedTanks.signals()
+        }
+        fn simulate(&self, _: &[f64], drive: &Drive, _: Noise) -> Result<Signal, SimulationError> {
+            let calls = self.0.fetch_add(1, Ordering::Relaxed);
+            Ok(Signal::from_elem((drive.samples(), 1), calls as f64))
+        }
+    }
+
+    #[test]
+    fn work_that_cannot_be_repeated_is_refused() {
+        let plan = RecordPlan::levels(0.5, 40, 0.0, 1.0, 5);
+        let twin = Twin::black_box(Counter(AtomicU64::new(0)));
+        let study = Study::new("counter", twin, plan).unwrap();
+        let error = study.manifest("bank", 1).unwrap_err();
+        assert!(matches!(error, StorageError::Unrepeatable), "{error}");
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl Verb for Features {
         let features = Array2::from_shape_vec((self.records.len(), map.dim()), all)
             .map_err(Failure::internal)?;
         if let Some(out) = &self.out {
-            file::write_features(out, &features)?;
+            write_result(out, |path| file::write_features(path, &features))?;
         }
         let rows: Vec<Vec<f64>> = features.rows().into_iter().map(|r| r.to_vec()).collect();
         let json = json!({

@@ -52,7 +52,7 @@ impl Verb for Resample {
             Inputs::Hold => InputRule::Hold,
         };
         let new = resample(&record, self.step, rule, self.longest_gap).in_file(&self.record)?;
-        new.record.write(&self.out)?;
+        write_result(&self.out, |path| Ok::<_, Failure>(new.record.write(path)?))?;
         let grid = |record: &Record| {
             let (shortest, longest) = steps(record);
             json!({

@@ -64,7 +64,9 @@ impl Verb for Simulate {
         let signals = twin.signals();
         record.check_channels(&signals)?;
         if let Some(out) = &self.out {
-            record.write_for(out, &signals)?;
+            write_result(out, |path| {
+                Ok::<_, Failure>(record.write_for(path, &signals)?)
+            })?;
         }
         let rows = || record.outputs().rows().into_iter().map(|row| row.to_vec());
         let json = json!({

@@ -109,7 +109,11 @@ pub(crate) fn check(draws: &Draws, parameters: usize) -> Result<(), String> {
     }
     for (what, matrix) in [("theta", theta), ("features", features)] {
         if let Some(((row, column), value)) = matrix.indexed_iter().find(|(_, v)| !v.is_finite()) {
-            return Err(format!("{what}, row {row}, column {column}: {value}"));
+            return Err(format!(
+                "{what}, row {}, column {}: {value}",
+                row + 1,
+                column + 1
+            ));
         }
     }
     Ok(())

@@ -10,8 +10,9 @@ use crate::estimator::settings::{Inputs, Settings};
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::network::{Checkpoints, History, NetworkError, Samples};
 use crate::progress::Progress;
-use crate::storage::sweep_beside;
+use crate::storage::files::write_result;
 use crate::storage::work::{Manifest, Share, WorkFolder};
+use crate::storage::{StorageError, sweep_beside};
 use ndarray::Array2;
 use serde_json::json;
 use std::borrow::Cow;
@@ -257,13 +258,17 @@ impl Pretraining {
         }
         let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(None))?;
         let lock = folder.lock()?;
+        let is_again = path.symlink_metadata().is_ok();
         let made = self.made(plan, &folder, progress).and_then(|made| {
-            made.0.save_again(path)?;
+            match is_again {
+                true => made.0.save_again(path),
+                false => write_result(path, |path| made.0.save(path)),
+            }?;
             Ok(made)
         });
         drop(lock);
         match &made {
-            Ok(_) => folder.remove()?,
+            Ok(_) | Err(EstimatorError::Work(StorageError::Kept { .. })) => folder.remove()?,
             // It would only stand in the way of the next call. What is wrong is said, not that it cannot be removed either.
             Err(error) if ends_for_good(error) || is_bare(&folder) => drop(folder.remove()),
             Err(_) => {}

@@ -23,6 +23,7 @@ use crate::estimator::error::EstimatorError;
 use crate::estimator::project::{PresetName, Project};
 use crate::estimator::settings::MOST_SIMULATIONS;
 use crate::progress::Progress;
+use crate::storage::files::write_result;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use folder::{SHARDS, Shards, VERB, conflict, rows_of_a_shard};
 use serde_json::json;
@@ -81,7 +82,25 @@ impl BankPlan {
         let prior = Prior::new(self.project.study(), features.as_ref())?;
         let manifest = self.manifest()?;
         let folder = WorkFolder::open::<EstimatorError>(path, &manifest, &[SHARDS], |_| Ok(None))?;
-        let shards = Shards::list(folder, manifest.clone())?;
+        let filled = self.filled(&folder, &manifest, share, &prior, progress);
+        if filled.is_err() {
+            // It would only stand in the way of the next call.
+            folder.remove_bare(SHARDS);
+        }
+        filled?;
+        finish(path, manifest)
+    }
+
+    /// Makes the shards of a share that are missing.
+    fn filled(
+        &self,
+        folder: &WorkFolder,
+        manifest: &Manifest,
+        share: Share,
+        prior: &Prior,
+        progress: &Progress,
+    ) -> Result<(), EstimatorError> {
+        let shards = Shards::list(folder.clone(), manifest.clone())?;
         let mine = || (0..shards.of).filter(|number| share.takes(*number));
         let stage = progress.stage("kept shards", mine().count());
         let mut missing = Vec::new();
@@ -95,10 +114,11 @@ impl BankPlan {
         let stage = progress.stage("bank", rows);
         for number in missing {
             let draws = prior.rows(shards.rows(number), self.seed, "bank", &stage)?;
-            let bytes = file::npz(&draws).map_err(|error| EstimatorError::io(path, error))?;
+            let bytes =
+                file::npz(&draws).map_err(|error| EstimatorError::io(folder.path(), error))?;
             shards.add(number, &bytes)?;
         }
-        finish(path, manifest)
+        Ok(())
     }
 
     /// Returns the progress of the folder; a complete one gets the checksums of its shards.
@@ -193,7 +213,7 @@ pub fn merge_into_file(
     });
     let draws = Draws::stacked(first.size, parts, |number| holders[number].odd(number))?;
     let names: Vec<&str> = first.names.iter().map(String::as_str).collect();
-    file::write(out, &draws, &names)?;
+    write_result(out, |path| file::write(path, &draws, &names))?;
     Ok(draws.theta.nrows())
 }
 

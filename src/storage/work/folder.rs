@@ -122,6 +122,13 @@ impl WorkFolder {
         unfinished::remove(&self.path).map_err(|error| StorageError::io(&self.path, error))
     }
 
+    /// Removes the folder if nothing is in `part`, the only one that it has.
+    pub(crate) fn remove_bare(&self, part: &str) {
+        if std::fs::remove_dir(self.file(part)).is_ok() {
+            let _ = unfinished::remove(&self.path);
+        }
+    }
+
     /// Adds the checksums of all pieces to the manifest: the work is finished.
     pub(crate) fn finish(&self, manifest: &Manifest, checksums: Value) -> Result<(), StorageError> {
         self.write(

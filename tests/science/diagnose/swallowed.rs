@@ -89,8 +89,8 @@ fn bursts_of_a_force_are_no_noise_in_many_records() {
     bursts_are_called(12, 1);
 }
 
-/// Independent pushes of Student's t distribution, their variance as declared, are noise: at most one of these records is a gap.
-fn heavy_tails(freedom: usize, seeds: u64) {
+/// Independent pushes of Student's t distribution, their variance as declared, are noise: at most so many records are called.
+fn heavy_tails(freedom: usize, seeds: u64, most: usize) {
     let mut called = vec![];
     for seed in 0..seeds {
         let mut source = Noise::new(73, "tails", seed).source("push");
@@ -108,7 +108,7 @@ fn heavy_tails(freedom: usize, seeds: u64) {
         }
     }
     assert!(
-        called.len() <= 1,
+        called.len() <= most,
         "{} of {seeds}: {called:#?}",
         called.len()
     );
@@ -117,14 +117,14 @@ fn heavy_tails(freedom: usize, seeds: u64) {
 /// Three records: a check that takes tails for a disturbance calls two of three.
 #[test]
 fn noise_with_heavy_tails_is_no_gap() {
-    heavy_tails(3, 3);
+    heavy_tails(3, 3, 1);
 }
 
 #[test]
 #[ignore = "two minutes; run it in release"]
 fn noise_with_heavy_tails_is_no_gap_in_many_records() {
-    heavy_tails(3, 30);
-    heavy_tails(5, 30);
+    heavy_tails(3, 30, 3);
+    heavy_tails(5, 30, 2);
 }
 
 /// No gap under noise of this level and of this correlation from a sample to the next.
