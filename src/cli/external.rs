@@ -55,7 +55,7 @@ fn program(options: &External, line: &str) -> Result<Study, Failure> {
     if let Some(seconds) = options.timeout {
         settings.timeout = Duration::try_from_secs_f64(seconds).map_err(|_| {
             Failure::user(format!(
-                "--timeout {}: give a positive number of seconds",
+                "--timeout {}: give a number of seconds above 0, up to a year",
                 number(seconds)
             ))
         })?;

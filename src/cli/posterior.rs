@@ -1,7 +1,7 @@
 //! Posterior draws in files.
 
 use super::failure::Failure;
-use crate::estimator::bank::file::write_matrices;
+use crate::estimator::bank::file::archive;
 use crate::fit::Posterior;
 use crate::report::posterior_svg;
 use crate::storage::NewFolder;
@@ -52,6 +52,7 @@ pub(super) fn write(
         posterior.modes[i] as f64
     });
     let matrices = [("draws", &posterior.values), ("mode", &modes)];
-    write_matrices(&folder.file("posterior.npz"), &matrices)?;
+    let bytes = archive(&matrices).map_err(Failure::internal)?;
+    folder.write("posterior.npz", bytes)?;
     Ok(folder.write("posterior.svg", posterior_svg(study, posterior))?)
 }

@@ -163,7 +163,8 @@ impl Provenance {
                 None => path.to_string(),
             }
         }));
-        parts.join(", ")
+        // A line is one, whatever is in a file's name.
+        parts.join(", ").replace('\n', "\u{fffd}")
     }
 }
 

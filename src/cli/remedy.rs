@@ -153,7 +153,7 @@ impl Remedy for StudyError {
                 number(*expected),
                 number(*given)
             ),
-            Self::NoFit => "[bounds] of the study file".into(),
+            Self::NoFit { .. } => "[bounds] of the study file".into(),
             _ => return None,
         })
     }

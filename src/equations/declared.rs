@@ -153,6 +153,10 @@ impl Declared {
             }
             self.begins = Some(at);
         }
+        if keys.contains_key("value") && keys.contains_key("mean") {
+            return table
+                .error("start has value and mean; a value is known, a mean with std is not");
+        }
         let key = if keys.contains_key("value") {
             "value"
         } else {

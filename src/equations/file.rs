@@ -87,6 +87,13 @@ pub(crate) fn take(
     text: &str,
     file: &mut DeTable<'_>,
 ) -> Result<Option<Equations>, EquationsError> {
+    if let Some((key, table)) = file
+        .keys()
+        .find_map(|key| Some((key, meant(key.get_ref())?)))
+    {
+        let problem = format!("[{}] is no table of a twin; write [{table}]", key.get_ref());
+        return SourceText(text).error(key.span().start, problem);
+    }
     let given = |table: &&str| file.get(*table).is_some();
     let Some(first) = TABLES[1..].iter().find(|table| given(table)) else {
         return Ok(None);
@@ -104,6 +111,14 @@ pub(crate) fn take(
     let name = DeValue::String(equations.name().to_owned().into());
     file.insert(Spanned::new(0..0, "twin".into()), Spanned::new(0..0, name));
     Ok(Some(equations))
+}
+
+/// The table whose name was written in the singular, or in the plural.
+fn meant(name: &str) -> Option<&'static str> {
+    let is_meant = |table: &&&str| {
+        table.strip_suffix('s') == Some(name) || name.strip_suffix('s') == Some(**table)
+    };
+    TABLES.iter().find(is_meant).copied()
 }
 
 /// Values of one state.

@@ -1,5 +1,7 @@
 //! Words, numbers and signs of an expression.
 
+use crate::storage::untrusted::excerpt;
+
 /// A piece of an expression.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Token<'t> {
@@ -42,7 +44,8 @@ pub(super) fn tokens(text: &str) -> Result<Vec<(usize, Token<'_>)>, Problem> {
             sign.len()
         } else {
             let problem = format!(
-                "unexpected {first:?}; expressions have numbers, names, + - * / ^ ( ) , and comparisons"
+                "unexpected \"{}\"; expressions have numbers, names, + - * / ^ ( ) , and comparisons",
+                excerpt(&first.to_string())
             );
             return Err((at, problem));
         };

@@ -285,8 +285,10 @@ fn csv_error(path: &Path, separator: u8, row: usize, error: csv::Error) -> Recor
                 separator_name(separator)
             )
         }
-        csv::ErrorKind::Utf8 { err, .. } => format!("row {row}: {err}"),
-        other => format!("{other:?}"),
+        csv::ErrorKind::Utf8 { err, .. } => {
+            format!("row {row}, column {} is no UTF-8", err.field() + 1)
+        }
+        _ => format!("row {row} is no row of a CSV file"),
     };
     let remedy = "a record is UTF-8 text, each row with as many cells as the header";
     RecordError::file(path, format!("{problem}; {remedy}"))

@@ -16,7 +16,10 @@ pub enum StorageError {
         error: io::Error,
     },
     /// An output in a folder that does not exist.
-    #[error("{}: the folder {} does not exist; make it first", .0.display(), folder(.0).display())]
+    #[error("{}: {} {}", .0.display(), folder(.0).display(), match folder(.0).exists() {
+        true => "is a file; name a place in a folder",
+        false => "does not exist; make it first",
+    })]
     NoParent(PathBuf),
     /// An output path that is a link to nothing.
     #[error("{} is a link to {}, which does not exist; remove it, or choose another place", path.display(), to.display())]

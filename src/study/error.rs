@@ -109,9 +109,12 @@ pub enum StudyError {
     Cancelled(#[from] Cancelled),
     /// No parameters fit a record.
     #[error(
-        "the twin cannot be filtered at any parameters that were tried; check units, step and bounds"
+        "the twin cannot be filtered at any parameters that were tried{cause}; check units, step and bounds"
     )]
-    NoFit,
+    NoFit {
+        /// What is wrong at the centre of the prior, in brackets; empty where a run without noise works.
+        cause: String,
+    },
     /// A record, its file, or its channels are wrong.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -153,7 +156,7 @@ pub enum StudyError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// A diagnosis is to leave out an effect that is unknown.
-    #[error("unknown effect {0}; leave out effects of this twin")]
+    #[error("unknown effect \"{0}\"; leave out effects of this twin")]
     Without(String),
     /// A diagnosis finds no starting point that can be fitted.
     #[error(

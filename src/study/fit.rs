@@ -11,7 +11,7 @@ use crate::likelihood::{Beliefs, measured, with_better_start};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
-use crate::twin::{NoiseLevel, StartLevel, Stepping, Twin};
+use crate::twin::{Noise, NoiseLevel, StartLevel, Stepping, Twin};
 use std::time::Instant;
 
 impl Study {
@@ -117,7 +117,8 @@ impl Study {
             (true, false) => ProfilesOf::Shaped,
             (false, false) => ProfilesOf::None,
         };
-        let mut fit = run(&measured, searched, (settings, which))?.ok_or(StudyError::NoFit)?;
+        let fitted = run(&measured, searched, (settings, which))?;
+        let mut fit = fitted.ok_or_else(|| self.no_fit(records))?;
         fit.stepping = other.map(|other| other.stepping);
         (fit.warnings).extend(other.map(|other| Warning::hold(other.stepping, Some(other.gain))));
         Ok((fit, measured.elsewhere.is_some()))
@@ -136,7 +137,22 @@ impl Study {
             twin: held.as_ref().unwrap_or(&study.twin),
             beliefs: &study.beliefs(),
         };
-        score(&subject, fit, record)?.ok_or(StudyError::NoFit)
+        score(&subject, fit, record)?.ok_or_else(|| self.no_fit(std::slice::from_ref(record)))
+    }
+
+    /// The error of records that no parameters fit, with what is wrong in the middle of the prior.
+    fn no_fit(&self, records: &[Record]) -> StudyError {
+        let centre = self.twin.parameters().centre();
+        let run = |record: &Record| {
+            self.twin
+                .simulate(&centre, record.drive(), Noise::OFF)
+                .err()
+        };
+        let error = records.iter().find_map(run);
+        let cause = error.map_or(String::new(), |error| {
+            format!(" (at the centre of the prior: {error})")
+        });
+        StudyError::NoFit { cause }
     }
 
     /// Returns whether the records say how inputs move between samples: the study's file does not.

@@ -75,8 +75,12 @@ impl Study {
 
 #[cfg(test)]
 mod tests {
+    use crate::record::{Drive, Signal, Signals};
+    use crate::storage::StorageError;
     use crate::study::{InputPlan, RecordPlan, Study};
+    use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
     use crate::twins::CascadedTanks;
+    use std::sync::atomic::{AtomicU64, Ordering};
 
     fn tanks(high: f64) -> Study {
         let plan = RecordPlan::levels(0.5, 40, 0.0, high, 5);
@@ -92,7 +96,7 @@ mod tests {
             ParameterSpace::new([Parameter::new("k", "1", 0.0, 1.0)])
         }
         fn signals(&self) -> Signals {
-            CascadedTanks.signals()
+            DigitalTwin::signals(&CascadedTanks)
         }
         fn simulate(&self, _: &[f64], drive: &Drive, _: Noise) -> Result<Signal, SimulationError> {
             let calls = self.0.fetch_add(1, Ordering::Relaxed);
@@ -103,8 +107,7 @@ mod tests {
     #[test]
     fn work_that_cannot_be_repeated_is_refused() {
         let plan = RecordPlan::levels(0.5, 40, 0.0, 1.0, 5);
-        let twin = Twin::black_box(Counter(AtomicU64::new(0)));
-        let study = Study::new("counter", twin, plan).unwrap();
+        let study = Study::new("counter", Counter(AtomicU64::new(0)), plan).unwrap();
         let error = study.manifest("bank", 1).unwrap_err();
         assert!(matches!(error, StorageError::Unrepeatable), "{error}");
     }

@@ -66,6 +66,7 @@ impl Study {
                     three_digits(one[k] - other[k]),
                     output.unit
                 )
+                .replace(" )", ")")
             };
             let name = &output.name;
             let most = most.filter(|k| *k != first);

@@ -11,7 +11,11 @@ use toml::de::{DeTable, DeValue};
 
 /// `[record]`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(
+    deny_unknown_fields,
+    default,
+    expecting = "a table with step, samples, input, hold, integrator, substeps, tolerance or columns"
+)]
 pub struct RecordTable {
     /// Step in seconds.
     pub step: Option<f64>,
@@ -162,6 +166,9 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
     for (key, value) in table {
         let key = key.get_ref();
         let problem = match value.get_ref() {
+            DeValue::Table(inner) if inner.is_empty() && name == "input" => {
+                "has no plan; give a number, a file, or { levels = [low, high], hold = n }"
+            }
             DeValue::Table(inner) if inner.is_empty() && name != "features" => {
                 "is empty; remove it"
             }

@@ -4,7 +4,7 @@ use crate::cli::prelude::*;
 use crate::cli::remedy::Remedy;
 use crate::estimator::PresetName;
 use crate::report::check_document;
-use crate::twin::conformance::{Finding, Severity, check, check_step};
+use crate::twin::conformance::{Finding, Severity, check, check_points, check_step};
 use crate::twin::{Noise, SimulationError, Twin};
 use std::sync::Arc;
 
@@ -52,6 +52,8 @@ impl Verb for Check {
             findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
         }
         if passes(&findings) {
+            let equations = study.twin().equations();
+            findings.extend(equations.and_then(|equations| check_points(equations, &drive)));
             findings.extend(study.check_own_runs(&drive, context.seed));
         }
         let passed = passes(&findings);

@@ -3,7 +3,7 @@
 use super::estimate::Answer;
 use crate::cli::prelude::*;
 use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
-use crate::record::Record;
+use crate::record::{Record, twin_csv_text};
 use crate::twin::Noise;
 
 /// A small bank and few epochs keep the demo short; the refinement corrects the rough network.
@@ -70,7 +70,10 @@ impl Verb for Demo {
             let Some((folder, out)) = folder.zip(self.out.as_ref()) else {
                 return Ok(());
             };
-            record.write_for(&folder.file("record.csv"), &study.twin().signals())?;
+            folder.write(
+                "record.csv",
+                twin_csv_text(&record, &study.twin().signals()),
+            )?;
             answer.write(&folder, &provenance)?;
             folder.finish()?;
             output::say(&format!(

@@ -141,8 +141,8 @@ impl Answer<'_> {
         let json = provenance.on(self.estimate.json(self.study));
         folder.write("estimate.json", format!("{json:#}"))?;
         if let Some(refit) = self.estimate.refit() {
-            let names: Vec<&str> = self.estimate.names.iter().map(String::as_str).collect();
-            file::write(&folder.file("cloud.npz"), &refit.cloud, &names)?;
+            let bytes = file::npz(&refit.cloud).map_err(Failure::internal)?;
+            folder.write("cloud.npz", bytes)?;
         }
         if let Some(draws) = &self.estimate.posterior {
             posterior::write(folder, self.study, draws)?;

@@ -134,7 +134,7 @@ fn complete(
     let all = names.join(", ");
     if let Some(name) = given.keys().find(|name| !names.contains(&name.as_str())) {
         return Err(wrong_theta(format!(
-            ": no parameter is called {name}{}; there are {all}",
+            ": no parameter is called \"{name}\"{}; there are {all}",
             did_you_mean(name, &names),
         )));
     }

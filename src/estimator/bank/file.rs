@@ -8,7 +8,8 @@
 //! Both keep every bit. The same draws give the same bytes: an archive carries no time.
 
 use super::Draws;
-use super::npy::{self, Npz, archive};
+pub(crate) use super::npy::archive;
+use super::npy::{self, Npz};
 use crate::estimator::error::EstimatorError;
 use crate::storage::files::write_new;
 use crate::storage::reading::{Reading, note_whole, open};
@@ -60,14 +61,6 @@ pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), Estimator
         _ => return Err(other_form(path)),
     };
     write_bytes(path, bytes)
-}
-
-/// Writes a new `.npz` archive of these matrices.
-pub(crate) fn write_matrices(
-    path: &Path,
-    matrices: &[(&str, &Array2<f64>)],
-) -> Result<(), EstimatorError> {
-    write_bytes(path, archive(matrices))
 }
 
 fn write_bytes(path: &Path, bytes: io::Result<Vec<u8>>) -> Result<(), EstimatorError> {
@@ -180,6 +173,16 @@ fn from_csv(from: impl Read, names: &[&str]) -> Result<Draws, String> {
     }
 }
 
+/// What is wrong with the row at a line.
+fn told(error: &csv::Error, line: usize) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths {
+            len, expected_len, ..
+        } => format!("row {line}: {len} cells, the header has {expected_len}"),
+        _ => error.to_string(),
+    }
+}
+
 fn rows_of_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
     let mut csv = Rows::new(file);
     let found = csv.header().map_err(|error| error.to_string())?;
@@ -190,17 +193,27 @@ fn rows_of_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
     }
     let (mut values, mut rows) = ([Vec::new(), Vec::new()], 0);
     let mut cells = csv::StringRecord::new();
-    while csv.read(&mut cells).map_err(|error| error.to_string())? {
+    loop {
+        match csv.read(&mut cells) {
+            Ok(true) => {}
+            Ok(false) => break,
+            Err(error) => return Err(told(&error, csv.line())),
+        }
+        // As an editor counts them.
+        let line = csv.line();
         if (rows + 1) * (d + n) > MOST_NUMBERS {
             return Err(format!(
                 "more than {MOST_NUMBERS} numbers; keep such a bank in shards"
             ));
         }
         for (column, cell) in cells.iter().enumerate() {
-            let value: Result<f64, _> = cell.parse();
-            values[usize::from(column >= d)].push(value.map_err(|_| {
+            let value = cell.parse::<f64>().ok().filter(|v| v.is_finite());
+            values[usize::from(column >= d)].push(value.ok_or_else(|| {
                 let cell = excerpt(cell);
-                format!("row {rows}, column {column}: \"{cell}\" is no number")
+                format!(
+                    "row {line}, column {}: \"{cell}\" is no finite number",
+                    column + 1
+                )
             })?);
         }
         rows += 1;

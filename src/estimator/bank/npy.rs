@@ -143,7 +143,7 @@ impl ArrayHeader {
 }
 
 /// Returns the bytes of an archive, not compressed; the same matrices give the same bytes.
-pub(super) fn archive(matrices: &[(&str, &Array2<f64>)]) -> io::Result<Vec<u8>> {
+pub(crate) fn archive(matrices: &[(&str, &Array2<f64>)]) -> io::Result<Vec<u8>> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)
         .last_modified_time(DateTime::default());

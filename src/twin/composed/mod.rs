@@ -35,6 +35,7 @@ pub(crate) use simulation::{Acting, DeadTime, check_start};
 
 use crate::record::{Drive, Signal};
 use crate::twin::integrator::felt;
+use crate::twin::points::Layout;
 use crate::twin::{
     Blocks, Hold, Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
     Stepping, StepsTaken, Workspace,
@@ -112,6 +113,22 @@ impl Composed {
         self.own.joins_lanes()
             && self.parts.acts.leave_motion()
             && self.integrator() != Integrator::Stiff
+    }
+
+    /// Returns names and units of the equations alone.
+    pub(crate) fn own_outline(&self) -> Outline {
+        self.own.outline()
+    }
+
+    /// Sets the start of the equations alone.
+    pub(crate) fn own_start(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.own.start(now, x);
+    }
+
+    /// Sets the rates of the equations alone, of one point or of several behind one another.
+    pub(crate) fn own_rates(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        let states = self.own.outline().states.len();
+        self.own.drift_points(now, Layout::dense(states), x, dx);
     }
 
     /// Returns names and units of all that is free, of states of parts, too.

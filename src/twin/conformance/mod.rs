@@ -11,10 +11,12 @@
 //! # Ok::<(), truetwin::record::RecordError>(())
 //! ```
 
+mod points;
 mod step;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use points::check_points;
 pub(crate) use step::{check_step, coarse_step};
 
 use crate::math::{six_digits, thin_svd};
@@ -254,7 +256,7 @@ impl Setting<'_> {
                 "a second run with the same arguments failed: {error}"
             )),
             Ok(_) => failed(
-                "two runs with the same arguments differ; take all randomness from `noise` and keep no state between runs",
+                "two runs with the same arguments differ; take all randomness from the noise or seed that a run is given, and keep no state between runs",
             ),
         }
     }
