@@ -216,3 +216,67 @@ fn an_answer_outlives_its_place() {
     assert!(at.join("o-2/fit.json").exists());
     assert_eq!(fs::read(at.join("o")).unwrap(), b"another's");
 }
+
+/// A file that appears while a network is trained stays, and the estimator is kept beside it.
+#[test]
+fn an_estimator_is_kept_beside_what_has_taken_its_place() {
+    let place = with_record();
+    let at = place.path();
+    let mut work = Command::new(TRUETWIN)
+        .args("pretrain --study short.toml --bank-size 300 --epochs 60 --out p.est".split(' '))
+        .current_dir(at)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Its own folder stands while it works; the place of the estimator is free.
+    while !at.join("p.est.part").exists() && work.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    fs::write(at.join("p.est"), "mine").unwrap();
+    let output = work.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", told(&output));
+    assert!(told(&output).contains("p-2.est"), "{}", told(&output));
+    assert_eq!(fs::read(at.join("p.est")).unwrap(), b"mine");
+    assert!(!at.join("p.est.part").exists());
+    json(&run(at, "estimate r.csv --estimator p-2.est --json"));
+}
+
+/// What failed before its first piece leaves nothing that a later call would have to be the same as.
+#[test]
+fn a_bank_that_fails_at_once_leaves_no_folder() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let program = |outputs: &str| {
+        let text = format!(
+            "import sys, json, time\n\
+             for line in sys.stdin:\n    q = json.loads(line)\n    \
+             if q['request'] == 'describe':\n        \
+             print(json.dumps({{'name': 'p', 'parameters': [{{'name': 'k', 'prior': [0.5, 2.0]}}], 'outputs': [{{'name': 'y'}}],\n            \
+             'record': {{'step': 0.1, 'samples': 20}}}}), flush=True)\n    \
+             else:\n        \
+             print(json.dumps({{'id': q['id'], {outputs}}}), flush=True)\n"
+        );
+        fs::write(at.join("p.py"), text).unwrap();
+    };
+    let bank = || {
+        Command::new(TRUETWIN)
+            .args(["bank", "--program", "python3 p.py", "--size", "30", "--out", "b"])
+            .current_dir(at)
+            .output()
+            .unwrap()
+    };
+    let refused = |part: &str| {
+        let output = bank();
+        assert_eq!(output.status.code(), Some(2), "{}", told(&output));
+        assert!(told(&output).contains(part), "{}", told(&output));
+        assert!(!at.join("b").exists(), "{part}");
+    };
+    program("'error': 'no licence'");
+    refused("no licence");
+    program("'outputs': {'y': [time.time() + i for i in range(20)]}");
+    refused("two simulations with one seed differ");
+    let noisy = "'outputs': {'y': [q['theta']['k'] * (i % 7) + ((q['seed'] * (i + 1)) % 97) / 97 for i in range(20)]}";
+    program(noisy);
+    let output = bank();
+    assert!(output.status.success(), "{}", told(&output));
+}
