@@ -1,6 +1,6 @@
 //! Words, numbers and signs of an expression.
 
-use crate::storage::untrusted::excerpt;
+use crate::storage::untrusted::hidden;
 
 /// A piece of an expression.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +45,10 @@ pub(super) fn tokens(text: &str) -> Result<Vec<(usize, Token<'_>)>, Problem> {
         } else {
             let problem = format!(
                 "unexpected \"{}\"; expressions have numbers, names, + - * / ^ ( ) , and comparisons",
-                excerpt(&first.to_string())
+                match hidden(first) {
+                    true => format!("U+{:04X}", u32::from(first)),
+                    false => first.to_string(),
+                }
             );
             return Err((at, problem));
         };

@@ -7,6 +7,7 @@ use crate::fit::{
 };
 use crate::hypothesis::search::asked::with_asked_noise;
 use crate::hypothesis::search::effects::searched;
+use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, measured, with_better_start};
 use crate::progress::Progress;
 use crate::record::Record;
@@ -73,7 +74,11 @@ impl Study {
         let study = self.for_records(records)?;
         let stage = progress.stage("fit", 1);
         let passes = Passes::heard_by(progress);
-        let (mut fit, elsewhere) = study.fit_once(asks, records, settings, &passes)?;
+        let (mut fit, elsewhere) =
+            (study.fit_once(asks, records, settings, &passes)).map_err(|error| match error {
+                StudyError::Filter(FilterError::Diverged { .. }) => study.no_fit(records),
+                other => other,
+            })?;
         if elsewhere && !self.file.effect.is_empty() {
             let trusting = study.trusting_starts();
             let again =

@@ -173,10 +173,11 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
                 "is empty; remove it"
             }
             DeValue::Table(inner) if keeps_intervals || matches!(name, "fixed" | "record") => {
-                check_table(name, inner)?;
+                let is_plan = name == "record" && key == "input";
+                check_table(if is_plan { "input" } else { name }, inner)?;
                 continue;
             }
-            DeValue::Datetime(_) if name == "record" => {
+            DeValue::Datetime(_) if matches!(name, "record" | "input") => {
                 "is no date; write a number, or a text in quotes"
             }
             value if name == "prior" && key == TRUST && !value.is_bool() => "is true or false",

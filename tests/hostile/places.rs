@@ -260,7 +260,15 @@ fn a_bank_that_fails_at_once_leaves_no_folder() {
     };
     let bank = || {
         Command::new(TRUETWIN)
-            .args(["bank", "--program", "python3 p.py", "--size", "30", "--out", "b"])
+            .args([
+                "bank",
+                "--program",
+                "python3 p.py",
+                "--size",
+                "30",
+                "--out",
+                "b",
+            ])
             .current_dir(at)
             .output()
             .unwrap()

@@ -7,7 +7,11 @@ const QUOTED: usize = 160;
 /// Longest message of a parser, in characters: it may list what it knows.
 const MESSAGE: usize = 2000;
 /// Words of parsers, and those of their readers.
-const WORDS: [(&str, &str); 15] = [
+const WORDS: [(&str, &str); 16] = [
+    (
+        "as i128, expected any valid TOML value",
+        "has too many digits",
+    ),
     ("invalid type: map", "found a table"),
     ("invalid type: sequence", "found a list"),
     ("invalid type: ", "found "),

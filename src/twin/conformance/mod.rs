@@ -272,7 +272,7 @@ impl Setting<'_> {
             }
             Ok(change) if !change.is_finite() => warned(TOO_LARGE),
             Ok(change) => failed(format!(
-                "1e-9 of the prior's width moves the outputs by {change:.1e} rms (noise: {spread:.1e}): draws depend on θ; open each source of noise by its own name and draw the same number of times"
+                "1e-9 of the prior's width moves the outputs by {change:.1e} rms (noise: {spread:.1e}): draws depend on θ; draw the same numbers in the same order for every θ, each source of noise by its own name"
             )),
             Err(error) => failed(error.to_string()),
         }

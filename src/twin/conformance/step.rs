@@ -63,7 +63,12 @@ pub(crate) fn coarse_step(
         .filter(|((error, (level, _)), _)| error.1 > *level)
         .map(|(((name, error), (level, source)), unit)| {
             let (error, level) = (three_digits(*error), three_digits(*level));
-            format!("{name} moves by {error} {unit} rms, {source} is {level} {unit}")
+            let unit = if unit.is_empty() {
+                unit
+            } else {
+                format!(" {unit}")
+            };
+            format!("{name} moves by {error}{unit} rms, {source} is {level}{unit}")
         })
         .collect();
     if coarse.is_empty() {

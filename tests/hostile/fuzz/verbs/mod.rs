@@ -129,8 +129,8 @@ fn fault(place: &Path, case: &Case, ended: &Ended, took: Duration) -> Option<Str
         return Some(format!("{left:?} stays"));
     }
     let has_out = place.join("o").exists() || place.join("o.csv").exists();
-    // A bank keeps the shards that are done, whatever ends it.
-    let keeps = case.words[0] == "bank";
+    // A bank keeps the shards that are done, whatever ends it; a diagnosis that is stopped writes what it has.
+    let keeps = case.words[0] == "bank" || ended.code == 130;
     (has_out && !is_of_check && ended.code != 0 && !keeps)
         .then(|| format!("code {}, and something is written: {said}", ended.code))
 }
