@@ -156,7 +156,7 @@ pub enum StudyError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// A diagnosis is to leave out an effect that is unknown.
-    #[error("unknown effect \"{0}\"; leave out effects of this twin")]
+    #[error("unknown effect {0}; leave out effects of this twin")]
     Without(String),
     /// A diagnosis finds no starting point that can be fitted.
     #[error(
