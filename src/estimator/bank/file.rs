@@ -168,7 +168,7 @@ fn from_csv(from: impl Read, names: &[&str]) -> Result<Draws, String> {
         b'\n' | b'\r' => Ok(draws),
         _ => Err(format!(
             "row {}, the last one, has no end of line and may be cut; make the file again, or end the row if it is whole",
-            draws.theta.nrows()
+            draws.theta.nrows() + 1
         )),
     }
 }
@@ -210,10 +210,7 @@ fn rows_of_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
             let value = cell.parse::<f64>().ok().filter(|v| v.is_finite());
             values[usize::from(column >= d)].push(value.ok_or_else(|| {
                 let cell = excerpt(cell);
-                format!(
-                    "row {line}, column {}: \"{cell}\" is no finite number",
-                    column + 1
-                )
+                format!("row {line}, column {}: \"{cell}\" is no number", column + 1)
             })?);
         }
         rows += 1;
@@ -347,11 +344,13 @@ mod tests {
             features: array![[1.0], [f64::NAN]],
             ..draws()
         };
-        assert!(refused("nan.npz", &npz(&nan).unwrap()).contains("row 1, column 0: NaN"));
+        assert!(refused("nan.npz", &npz(&nan).unwrap()).contains("row 2, column 1: NaN"));
         assert!(refused("header.csv", b"a,c,x1\n1,2,3\n").contains("a,b,x1"));
         assert!(refused("cell.csv", b"a,b,x1\n1,2,z\n").contains("\"z\" is no number"));
-        assert!(refused("ragged.csv", b"a,b,x1\n1,2\n").contains("2 fields"));
+        assert!(
+            refused("ragged.csv", b"a,b,x1\n1,2\n").contains("row 2: 2 cells, the header has 3")
+        );
         let cut = refused("cut.csv", b"a,b,x1\n1,2,0.125\n1,2,0.1");
-        assert!(cut.contains("row 2, the last one"), "{cut}");
+        assert!(cut.contains("row 3, the last one"), "{cut}");
     }
 }
