@@ -112,7 +112,7 @@ pub enum StudyError {
         "the twin cannot be filtered at any parameters that were tried{cause}; check units, step and bounds"
     )]
     NoFit {
-        /// What is wrong at the centre of the prior, in brackets; empty where a run without noise works.
+        /// Fault at the centre of the prior, in brackets; empty where a run without noise works.
         cause: String,
     },
     /// A record, its file, or its channels are wrong.

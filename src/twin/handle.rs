@@ -79,6 +79,14 @@ impl Twin {
         }
     }
 
+    /// Returns whether a record fits the noise level of this state.
+    pub(crate) fn fits_noise_of(&self, state: usize) -> bool {
+        match self {
+            Self::Equations(twin) => twin.fits_noise_of(state),
+            Self::BlackBox(_) => false,
+        }
+    }
+
     /// Checks that the twin can be simulated on the time grid of a drive: equations start no later than at its first row, a black box needs one
     /// step.
     pub(crate) fn check_drive(&self, drive: &Drive) -> Result<(), RecordError> {

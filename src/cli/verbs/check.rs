@@ -52,8 +52,7 @@ impl Verb for Check {
             findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
         }
         if passes(&findings) {
-            let equations = study.twin().equations();
-            findings.extend(equations.and_then(|equations| check_points(equations, &drive)));
+            findings.extend(check_points(study.twin(), &drive));
             findings.extend(study.check_own_runs(&drive, context.seed));
         }
         let passed = passes(&findings);

@@ -126,8 +126,7 @@ fn places(problem: &Problem) -> Vec<NoisyPlace> {
     let mut all = vec![];
     for (i, state) in outline.states.iter().enumerate() {
         let is_own = |p: &Parameter| p.role == Role::Noise && p.target() == state.name;
-        let is_fitted = twin.equations().is_some_and(|twin| twin.fits_noise_of(i));
-        if is_fitted || outline.parameters.iter().any(is_own) {
+        if twin.fits_noise_of(i) || outline.parameters.iter().any(is_own) {
             let (name, unit, entry) = (state.name.clone(), state.rate_unit(), Entry::State(i));
             let memories = memories(entry);
             all.push(NoisyPlace {

@@ -173,7 +173,7 @@ fn from_csv(from: impl Read, names: &[&str]) -> Result<Draws, String> {
     }
 }
 
-/// What is wrong with the row at a line.
+/// Says what is wrong with the row at a line.
 fn told(error: &csv::Error, line: usize) -> String {
     match error.kind() {
         csv::ErrorKind::UnequalLengths {

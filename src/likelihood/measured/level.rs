@@ -155,7 +155,7 @@ fn ranges(median: f64, deviation: f64, floor: f64) -> [Interval; 2] {
     })
 }
 
-/// What is known of a level before the records are seen.
+/// Belief in a level before the records are seen.
 struct Guess<'a> {
     name: &'a str,
     unit: String,
@@ -231,14 +231,13 @@ fn leaders(guesses: &[Option<Guess<'_>>], beliefs: &Beliefs) -> Vec<Option<usize
         .collect()
 }
 
-/// The twin with these sizes of states and outputs.
-pub(super) fn build(
-    base: &Composed,
-    outline: &Outline,
+/// Beliefs in the levels of states, and of outputs; none where a level is known, or a parameter of the twin's own.
+fn guesses<'a>(
+    outline: &'a Outline,
     records: &[Record],
     beliefs: &Beliefs,
     sizes: &RecordSizes,
-) -> Measured {
+) -> [Vec<Option<Guess<'a>>>; 2] {
     let step = records[0].drive().dt();
     let longest = records.iter().map(Record::samples).max().unwrap_or(1) as f64 * step;
     let is_fitted = |name: &str| {
@@ -274,8 +273,21 @@ pub(super) fn build(
         };
         is_fitted(&output.name).then(guess)
     };
-    let states: Vec<_> = (0..outline.states.len()).map(of_state).collect();
-    let outputs: Vec<_> = (0..outline.outputs.len()).map(of_output).collect();
+    [
+        (0..outline.states.len()).map(of_state).collect(),
+        (0..outline.outputs.len()).map(of_output).collect(),
+    ]
+}
+
+/// The twin with these sizes of states and outputs.
+pub(super) fn build(
+    base: &Composed,
+    outline: &Outline,
+    records: &[Record],
+    beliefs: &Beliefs,
+    sizes: &RecordSizes,
+) -> Measured {
+    let [states, outputs] = guesses(outline, records, beliefs, sizes);
     let leaders = leaders(&states, beliefs);
 
     let twin = Twin::Equations(base.clone());

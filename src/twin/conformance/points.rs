@@ -3,16 +3,11 @@
 use super::Finding;
 use crate::math::three_digits;
 use crate::record::Drive;
-use crate::twin::{Composed, Now};
-
-/// Largest difference, as a share of the largest rate. Sums in another order differ by a millionth of it; a table that is read along its
-/// other side differs by all of it.
-const SHARE: f64 = 1e-6;
-/// Points that are compared: a table of one or two might be read along either side.
-const POINTS: usize = 3;
+use crate::twin::{Now, Twin};
 
 /// Compares the rates of points around the start with those of each point alone; a finding only where they differ.
-pub(crate) fn check_points(twin: &Composed, drive: &Drive) -> Option<Finding> {
+pub(crate) fn check_points(twin: &Twin, drive: &Drive) -> Option<Finding> {
+    let twin = twin.equations()?;
     let outline = twin.own_outline();
     let theta = outline.parameters.centre();
     let now = Now::new(drive.time(0), drive.step(0), drive.input(0), &theta);
@@ -26,7 +21,8 @@ pub(crate) fn check_points(twin: &Composed, drive: &Drive) -> Option<Finding> {
             .enumerate()
             .map(move |(i, x)| x + share * (1.0 + x.abs()) * (i + 1) as f64)
     };
-    let x: Vec<f64> = (0..POINTS).flat_map(beside).collect();
+    // A table of two points of two states might be read along either side.
+    let x: Vec<f64> = (0..n + 1).flat_map(beside).collect();
     let rates = |x: &[f64]| {
         let mut dx = vec![0.0; x.len()];
         twin.own_rates(&now, x, &mut dx);
@@ -38,8 +34,9 @@ pub(crate) fn check_points(twin: &Composed, drive: &Drive) -> Option<Finding> {
         .iter()
         .chain(&alone)
         .fold(0.0, |a: f64, v| a.max(v.abs()));
-    // What is not finite beside the start may be no rate at all.
-    let differs = |(one, other): (&f64, &f64)| (one - other).abs() > SHARE * largest;
+    // Sums in another order differ by a millionth of the largest rate, a table that is read along its other side by all of it. What is not
+    // finite beside the start may be no rate at all.
+    let differs = |(one, other): (&f64, &f64)| (one - other).abs() > 1e-6 * largest;
     let at = together.iter().zip(&alone).position(differs)?;
     Some(Finding::failure(
         "points",
@@ -57,7 +54,7 @@ pub(crate) fn check_points(twin: &Composed, drive: &Drive) -> Option<Finding> {
 mod tests {
     use super::*;
     use crate::math::Lanes;
-    use crate::twin::{Blocks, Outline, Parameter, StateSpace};
+    use crate::twin::{Blocks, Composed, Outline, Parameter, StateSpace};
     use std::sync::Arc;
 
     /// Decay of two states; a block of points may be answered along its other side.
@@ -101,8 +98,12 @@ mod tests {
     #[test]
     fn blocks_that_are_turned_are_found() {
         let drive = Drive::autonomous(0.1, 10).unwrap();
-        let found =
-            |is_turned| check_points(&Composed::in_blocks(Arc::new(Decay { is_turned })), &drive);
+        let found = |is_turned| {
+            check_points(
+                &Twin::Equations(Composed::in_blocks(Arc::new(Decay { is_turned }))),
+                &drive,
+            )
+        };
         assert!(found(false).is_none());
         let finding = found(true).unwrap();
         assert!(
