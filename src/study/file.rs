@@ -377,7 +377,11 @@ mod tests {
             ),
             (
                 "twin = 'x'\n[record.input]\nu1 = 2024-03-31\n",
-                "s.toml, line 3: [record] u1 is no date",
+                "s.toml, line 3: [record] input u1 is no date",
+            ),
+            (
+                "twin = 'x'\n[record.input]\nu1 = {}\n",
+                "s.toml, line 3: [record] input u1 has no plan",
             ),
             ("twin = 'x'\n[record]\nsubsteps = 1e9\n", "s.toml, line 3"),
             ("twin = 'x'\n[record]\nsubsteps = -1\n", "s.toml, line 3"),

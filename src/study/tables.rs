@@ -192,7 +192,11 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
             }
             _ => continue,
         };
-        return Err((value.span().start, format!("[{name}] {key} {problem}")));
+        let place = match name {
+            "input" => "[record] input".to_owned(),
+            _ => format!("[{name}]"),
+        };
+        return Err((value.span().start, format!("{place} {key} {problem}")));
     }
     Ok(())
 }

@@ -132,7 +132,7 @@ fn searches_arrive() {
     }
 }
 
-/// Twenty seeds of each; the table of docs/fitting.md. Some 25 minutes of one core.
+/// Twenty seeds of each: an hour or two of one core.
 #[test]
 #[ignore = "minutes; cargo test --release --test science searches -- --ignored --nocapture"]
 fn searches_of_twenty_seeds_arrive() {
