@@ -192,11 +192,12 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
             }
             _ => continue,
         };
-        let place = match name {
-            "input" => "[record] input".to_owned(),
-            _ => format!("[{name}]"),
+        let (table, within) = match name {
+            "input" => ("record", " input"),
+            _ => (name, ""),
         };
-        return Err((value.span().start, format!("{place} {key} {problem}")));
+        let problem = format!("[{table}]{within} {key} {problem}");
+        return Err((value.span().start, problem));
     }
     Ok(())
 }
