@@ -16,11 +16,11 @@ pub enum StorageError {
         error: io::Error,
     },
     /// An output in a folder that does not exist.
-    #[error("{}: {} {}", .0.display(), folder(.0).display(), match folder(.0).exists() {
-        true => "is a file; name a place in a folder",
-        false => "does not exist; make it first",
-    })]
+    #[error("{}: {} does not exist; make it first", .0.display(), folder(.0).display())]
     NoParent(PathBuf),
+    /// An output in what is no folder.
+    #[error("{}: {} is a file; name a place in a folder", .0.display(), folder(.0).display())]
+    InFile(PathBuf),
     /// An output path that is a link to nothing.
     #[error("{} is a link to {}, which does not exist; remove it, or choose another place", path.display(), to.display())]
     Dangling {

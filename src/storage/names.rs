@@ -45,16 +45,11 @@ pub(super) fn places_beside(place: &Path) -> impl Iterator<Item = PathBuf> {
     (2..100).map(move |number| {
         let mut name = stem.to_owned();
         name.push(format!("-{number}"));
-        let path = place.with_file_name(name);
-        match ending.is_empty() {
-            true => path,
-            false => {
-                let mut path = path.into_os_string();
-                path.push(".");
-                path.push(ending);
-                path.into()
-            }
+        if !ending.is_empty() {
+            name.push(".");
+            name.push(ending);
         }
+        place.with_file_name(name)
     })
 }
 

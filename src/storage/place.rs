@@ -8,14 +8,15 @@ use super::unfinished::{file_beside, sweep_beside};
 use std::io;
 use std::path::Path;
 
-/// Refuses a place in a folder that does not exist, and a name of unfinished files.
+/// Refuses a place in a folder that does not exist or is none, and a name of unfinished files.
 pub(crate) fn check_place(path: &Path) -> Result<(), StorageError> {
     if is_reserved(path) {
         return Err(StorageError::Reserved(path.into()));
     }
-    match folder(path).is_dir() {
-        true => Ok(()),
-        false => Err(StorageError::NoParent(path.into())),
+    match folder(path).metadata() {
+        Ok(data) if data.is_dir() => Ok(()),
+        Ok(_) => Err(StorageError::InFile(path.into())),
+        Err(_) => Err(StorageError::NoParent(path.into())),
     }
 }
 

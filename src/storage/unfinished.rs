@@ -63,11 +63,8 @@ impl<T: AsRef<Path>> Drop for Unfinished<T> {
     fn drop(&mut self) {
         let Some(one) = self.0.take() else { return };
         let mut made = made_here();
-        let path = one.as_ref().to_owned();
-        made.remove(&path);
+        made.remove(one.as_ref());
         drop(one);
-        // Where no file can be opened, a whole folder is not removed.
-        let _ = remove_one_by_one(&path);
     }
 }
 

@@ -83,11 +83,12 @@ impl BankPlan {
         let manifest = self.manifest()?;
         let folder = WorkFolder::open::<EstimatorError>(path, &manifest, &[SHARDS], |_| Ok(None))?;
         let filled = self.filled(&folder, &manifest, share, &prior, progress);
-        if filled.is_err() {
-            // It would only stand in the way of the next call.
-            folder.remove_bare(SHARDS);
-        }
-        filled?;
+        filled.inspect_err(|error| {
+            // It would only stand in the way of the next call. One that is stopped may have others beside it.
+            if !matches!(error, EstimatorError::Cancelled(_)) {
+                folder.remove_bare(SHARDS);
+            }
+        })?;
         finish(path, manifest)
     }
 
