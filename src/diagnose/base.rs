@@ -81,14 +81,14 @@ impl Base {
             base_fit(&problem, initial.as_deref(), settings.noise())?
                 .map(|fitted| (problem, fitted))
         };
-        let (problem, fitted) = fitted.ok_or(StudyError::NoStart)?;
+        let (problem, fitted) = fitted.ok_or(StudyError::NO_FIT)?;
         let model = Model::bare(
             twin.clone(),
             problem,
             fitted,
             settings.lacks(Ablation::Evidence),
         )
-        .ok_or(StudyError::NoStart)?;
+        .ok_or(StudyError::NO_FIT)?;
         let outline = model.problem.outline();
         let outputs = &outline.outputs;
         let sensors = targets(TargetKind::Sensor, None, &twin.signals());

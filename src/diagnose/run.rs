@@ -46,7 +46,13 @@ pub fn diagnose(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Diagnosis, StudyError> {
-    (study.twin()).side_by_side(|| whole(study, records, validation, settings, progress))
+    let whole = || whole(study, records, validation, settings, progress);
+    (study.twin())
+        .side_by_side(whole)
+        .map_err(|error| match error {
+            StudyError::NoFit { .. } => study.no_fit(records),
+            other => other,
+        })
 }
 
 fn whole(

@@ -229,16 +229,24 @@ impl<'a> Doubts<'a> {
             .extend(start.map(|start| Warning::elsewhere(start, records)));
     }
 
-    /// Warns of a search that has not arrived.
-    pub fn search(&mut self, convergence: &Convergence) {
+    /// Warns of a search that has not arrived, [`by_step`](Self::steps) or for want of what a record tells.
+    pub fn search(&mut self, convergence: &Convergence, by_step: bool) {
         if convergence.converged {
             return;
         }
+        let distance = match convergence.distance {
+            far if far.is_finite() => format!("{far:.2} standard deviations from the top, "),
+            _ => String::new(),
+        };
         let what = format!(
-            "the search has not arrived: {:.2} standard deviations from the top, {} of {} searches agree",
-            convergence.distance, convergence.agreeing, convergence.searches
+            "the search has not arrived: {distance}{} of {} searches agree",
+            convergence.agreeing, convergence.searches
         );
-        self.warn(NOT_CONVERGED, what);
+        let mut doubt = Warning::new(NOT_CONVERGED, what);
+        if by_step {
+            doubt.remedy = "give the twin a step that it can take, and fit again";
+        }
+        self.all.push(doubt);
     }
 
     /// Warns of parameters, magnitudes and noise levels at a bound.
@@ -269,10 +277,11 @@ impl<'a> Doubts<'a> {
         }
     }
 
-    /// Warns of free runs that do not follow the records.
-    pub fn runs(&mut self, errors: &[OutputErrors]) {
+    /// Warns of free runs that do not follow the records; of those that diverge, unless [the step](Self::steps) is to blame.
+    pub fn runs(&mut self, errors: &[OutputErrors], by_step: bool) {
         for e in errors {
             match e.free_run {
+                None if by_step => {}
                 None => self.warn(DIVERGES, format!("the free run of {} diverges", e.name)),
                 Some(rmse) if rmse >= e.deviation => self.all.push(Warning::no_better(&e.name)),
                 Some(_) => {}
@@ -293,21 +302,29 @@ impl<'a> Doubts<'a> {
         self.warn("process-noise", what);
     }
 
-    /// Warns of channels that never move, and of a step that is too long for the fitted twin: a free run that diverges says nothing of
-    /// the step.
-    pub fn records(&mut self, runs: bool) {
-        let (problem, theta) = (self.problem, self.theta);
+    /// Warns of channels that never move.
+    pub fn still(&mut self) {
+        let problem = self.problem;
         self.all
             .extend(Warning::still(&problem.twin.signals(), &problem.records));
-        for (r, record) in problem.records.iter().enumerate().filter(|_| runs) {
+    }
+
+    /// Warns of steps that are too long for the fitted twin; returns whether free runs diverge, and all that do by their step.
+    pub fn steps(&mut self, free_runs: &[Option<Signal>]) -> bool {
+        let problem = self.problem;
+        let (mut diverging, mut by_step) = (0, 0);
+        for (r, (record, run)) in problem.records.iter().zip(free_runs).enumerate() {
             let of = match problem.records.len() {
                 1 => String::new(),
                 _ => format!(" of record {}", r + 1),
             };
-            let theta = problem.of_record(r, theta);
-            self.all
-                .extend(Warning::step(&problem.twin, &theta, record, &of));
+            let theta = problem.of_record(r, self.theta);
+            let doubt = Warning::step(&problem.twin, &theta, record, &of);
+            diverging += usize::from(run.is_none());
+            by_step += usize::from(run.is_none() && doubt.is_some());
+            self.all.extend(doubt);
         }
+        diverging > 0 && by_step == diverging
     }
 }
 

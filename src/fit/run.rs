@@ -85,13 +85,14 @@ pub(crate) fn run(
         }
     }
     let mut doubts = Doubts::new(&problem, &fitted.theta);
+    let by_step = doubts.steps(&free_runs);
     doubts.below(without.filter(|_| !ends), fitted.log_likelihood);
-    doubts.search(&convergence);
+    doubts.search(&convergence, by_step);
     doubts.start(measured.elsewhere.as_ref());
     doubts.bounds(&parameters, &noise_levels, &off);
-    doubts.runs(&errors);
+    doubts.runs(&errors, by_step);
     doubts.swallowed(swallowed(&problem, &fitted, levels, &errors)?);
-    doubts.records(free_runs.iter().all(Option::is_some));
+    doubts.still();
     Ok(Some(Fit {
         parameters,
         noise: noise_levels,

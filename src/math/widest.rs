@@ -23,6 +23,16 @@ impl<T, F: FnOnce() -> T> Kernel for F {
 /// where a kernel asks for `mul_add`, which is exact everywhere.
 #[inline]
 pub(crate) fn widest<K: Kernel>(kernel: K) -> K::Output {
+    match wide(kernel) {
+        Ok(output) => output,
+        Err(kernel) => kernel.run(),
+    }
+}
+
+/// As [`widest`], on processors with wide vectors alone: a kernel is long to compile, and its caller may have another way. It comes back where
+/// there are none. Processors other than x86-64 have one width, which counts as wide.
+#[inline]
+pub(crate) fn wide<K: Kernel>(kernel: K) -> Result<K::Output, K> {
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma")]
@@ -41,11 +51,13 @@ pub(crate) fn widest<K: Kernel>(kernel: K) -> K::Output {
                 && is_x86_feature_detected!("avx512vl")
             {
                 // SAFETY: the processor has all the instructions that `avx512` is compiled with.
-                return unsafe { avx512(kernel) };
+                return Ok(unsafe { avx512(kernel) });
             }
             // SAFETY: the processor has all the instructions that `avx2` is compiled with.
-            return unsafe { avx2(kernel) };
+            return Ok(unsafe { avx2(kernel) });
         }
+        Err(kernel)
     }
-    kernel.run()
+    #[cfg(not(target_arch = "x86_64"))]
+    Ok(kernel.run())
 }

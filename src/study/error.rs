@@ -158,11 +158,6 @@ pub enum StudyError {
     /// A diagnosis is to leave out an effect that is unknown.
     #[error("unknown effect {0}; leave out effects of this twin")]
     Without(String),
-    /// A diagnosis finds no starting point that can be fitted.
-    #[error(
-        "no starting point could be fitted to the record; check units and step of the record, and the prior"
-    )]
-    NoStart,
     /// A simulation failed in a way that other parameters cannot mend.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
@@ -185,6 +180,11 @@ impl From<FilterError> for StudyError {
 }
 
 impl StudyError {
+    /// No parameters fit a record, for a reason that [`Study::fit`](super::Study::fit) would tell.
+    pub(crate) const NO_FIT: Self = Self::NoFit {
+        cause: String::new(),
+    };
+
     /// Returns what stands for the record that caused the error among what stands for all of them, if one did.
     pub(crate) fn culprit<'a, R>(
         &self,
@@ -198,7 +198,6 @@ impl StudyError {
                 Some(index) => records.get(*index),
                 None => validation,
             },
-            Self::NoStart => records.first(),
             _ => None,
         }
     }

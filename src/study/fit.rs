@@ -12,6 +12,7 @@ use crate::likelihood::{Beliefs, measured, with_better_start};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
+use crate::twin::conformance::coarse_step;
 use crate::twin::{Noise, NoiseLevel, StartLevel, Stepping, Twin};
 use std::time::Instant;
 
@@ -145,17 +146,20 @@ impl Study {
         score(&subject, fit, record)?.ok_or_else(|| self.no_fit(std::slice::from_ref(record)))
     }
 
-    /// The error of records that no parameters fit, with what is wrong in the middle of the prior.
-    fn no_fit(&self, records: &[Record]) -> StudyError {
+    /// The error of records that no parameters fit, with what is wrong in the middle of the prior: the step, if a finer one mends it.
+    pub(crate) fn no_fit(&self, records: &[Record]) -> StudyError {
         let centre = self.twin.parameters().centre();
-        let run = |record: &Record| {
-            self.twin
-                .simulate(&centre, record.drive(), Noise::OFF)
-                .err()
+        let fault = |record: &Record| {
+            let drive = record.drive();
+            let error = self.twin.simulate(&centre, drive, Noise::OFF).err()?;
+            Some(match coarse_step(&self.twin, &centre, drive) {
+                Some(Ok(Some(coarse))) => format!("the step is {coarse}"),
+                _ => error.to_string(),
+            })
         };
-        let error = records.iter().find_map(run);
-        let cause = error.map_or(String::new(), |error| {
-            format!(" (at the centre of the prior: {error})")
+        let cause = records.iter().find_map(fault);
+        let cause = cause.map_or(String::new(), |cause| {
+            format!(" (at the centre of the prior: {cause})")
         });
         StudyError::NoFit { cause }
     }
@@ -215,6 +219,65 @@ impl Study {
                 .map(|(name, _)| name.clone())
                 .collect(),
             starts: starts.map(|(name, _)| name.clone()).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::{DiagnoseSettings, diagnose};
+    use crate::study::StudyFile;
+
+    /// A study of 61 samples, and a record of it at θ that is made with adaptive steps.
+    fn recorded(tables: &str, step: f64, theta: &[f64]) -> (Study, [Record; 1]) {
+        let [adaptive, fixed] = ["adaptive", "runge-kutta-4"].map(|integrator| {
+            let text = format!(
+                "{tables}[record]\nstep = {step}\nsamples = 61\nintegrator = '{integrator}'\n"
+            );
+            let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+            Study::of_file(&file).unwrap()
+        });
+        let drive = adaptive.drive(Noise::new(1, "drive", 0)).unwrap();
+        let noise = Noise::new(1, "measured", 0);
+        let outputs = adaptive.twin().simulate(theta, &drive, noise);
+        (fixed, [Record::new(drive, outputs.unwrap()).unwrap()])
+    }
+
+    /// Whether a fit goes wrong or ends, the step is told as the reason; what diverges by it alone is not told as the twin's fault.
+    #[test]
+    fn a_step_that_the_twin_cannot_take_is_the_reason() {
+        let brusselator = "[twin]\nname = 'brusselator'\n\
+            [parameters]\nA = { prior = [0.5, 6.0] }\nB = { prior = [0.5, 6.0] }\n\
+            [states]\nX = { rate = 'A + X^2*Y - (B + 1)*X', start = 1.0 }\n\
+            Y = { rate = 'B*X - X^2*Y', start = 1.0 }\n\
+            [outputs]\ny1 = { value = 'X' }\ny2 = { value = 'Y' }\n";
+        let reaction = "[twin]\nname = 'reaction'\n[parameters]\nk = { prior = [1e4, 1e5] }\n\
+            [states]\na = { rate = '-k*a*b', start = 0.08 }\nb = { rate = '-k*a*b', start = 0.2 }\n\
+            [outputs]\ny = { value = 'a', noise = 1e-3 }\n";
+        let remedy = "the integrator adaptive";
+        for (tables, step, theta) in [
+            (brusselator, 0.5, &[1.0, 3.0][..]),
+            (reaction, 0.01, &[3e4][..]),
+        ] {
+            let (fixed, records) = recorded(tables, step, theta);
+            match fixed.fit(&records) {
+                Ok(fit) => {
+                    let mut told = fit.warnings.iter();
+                    assert!(told.any(|w| w.what.contains(remedy)), "{:?}", fit.warnings);
+                    let mut told = fit.warnings.iter();
+                    assert!(told.all(|w| w.code != "free-run-diverges"));
+                }
+                Err(error) => assert!(error.to_string().contains(remedy), "{error}"),
+            }
+            let settings = DiagnoseSettings {
+                quick: true,
+                ..DiagnoseSettings::default()
+            };
+            let silent = Progress::silent();
+            if let Err(error) = diagnose(&fixed, &records, None, &settings, &silent) {
+                assert!(error.to_string().contains(remedy), "{error}");
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::cli::prelude::*;
 use crate::cli::remedy::Remedy;
 use crate::estimator::PresetName;
 use crate::report::check_document;
-use crate::twin::conformance::{Finding, Severity, check, check_points, check_step};
+use crate::twin::conformance::{Finding, Severity, blamed_step, check, check_points, check_step};
 use crate::twin::{Noise, SimulationError, Twin};
 use std::sync::Arc;
 
@@ -43,9 +43,11 @@ impl Verb for Check {
         let twin = (study.twin())
             .watched(move || (counter.tick()).map_err(|stop| SimulationError::Fatal(stop.into())));
         let mut findings = check(&twin, &drive, context.seed);
-        if passes(&findings) {
-            findings.extend(check_step(&twin, &twin.parameters().centre(), &drive));
-        }
+        let step = match passes(&findings) {
+            true => check_step,
+            false => blamed_step,
+        };
+        findings.extend(step(&twin, &twin.parameters().centre(), &drive));
         stage.finish();
         context.progress.checkpoint().map_err(Failure::internal)?;
         if passes(&findings) {

@@ -48,7 +48,7 @@ pub(in crate::diagnose) fn calibrate(
             }
             let value = match log_odds(&records) {
                 Ok(value) => Some(value),
-                Err(StudyError::NoStart) => None,
+                Err(StudyError::NoFit { .. }) => None,
                 Err(StudyError::Cancelled(_)) if settings.give_partial => {
                     is_cut.store(true, Ordering::Relaxed);
                     return Ok(None);

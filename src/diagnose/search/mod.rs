@@ -144,13 +144,13 @@ impl<E: Evidence> Search<E> {
         while let Some(change) = best.asked_for(watch)? {
             let next = match best.with(&change, watch) {
                 Ok(Some(next)) => next.run(watch),
-                Ok(None) => Err(StudyError::NoStart),
+                Ok(None) => Err(StudyError::NO_FIT),
                 Err(error) => Err(error),
             };
             match next {
                 Ok(next) if best.is_beaten_by(&next, &change) => best = next,
                 // A twin that its own step holds together may go nowhere with a finer one.
-                Ok(_) | Err(StudyError::NoStart) => {
+                Ok(_) | Err(StudyError::NoFit { .. }) => {
                     best.refused.push(change);
                     best = best.run(watch)?;
                 }

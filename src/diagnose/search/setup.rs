@@ -98,7 +98,7 @@ impl<'s> Task<'s> {
             return seeing(None).fitted(self.records.clone());
         };
         match seeing(Some(rows)).fitted(part) {
-            Err(StudyError::NoStart) => self.setup(self.budget.more_rows * rows),
+            Err(StudyError::NoFit { .. }) => self.setup(self.budget.more_rows * rows),
             other => other,
         }
     }

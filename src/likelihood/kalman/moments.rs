@@ -31,8 +31,8 @@ const BEND: f64 = SQRT_2 / 3.0;
 
 /// Up to so many states a sum of products keeps its entries in registers one by one.
 const FEW: usize = 4;
-/// Sizes that are known when this is compiled.
-const KNOWN: usize = 10;
+/// Up to so many states a sum of products goes row by row; more are faster in tiles.
+const ROWS: usize = 10;
 
 /// A state that is carried, as mean and covariance, n and n × n.
 pub(super) type Moment<'w, N> = (&'w mut [N], &'w mut [N]);
@@ -307,7 +307,7 @@ pub(super) fn add_outer<N: Number>(deviations: &[N], n: usize, sum: &mut [N]) {
         }
         return;
     }
-    if n <= KNOWN {
+    if n <= ROWS {
         add_rows(deviations, n, sum);
     } else {
         widest(SumOfTiles { deviations, n, sum });

@@ -6,7 +6,7 @@ use super::moments::{Moment, Moments};
 use super::normal::clip::clip;
 use super::number::FilterNumber;
 use super::order::Order;
-use super::size::{Buffer, Size};
+use super::size::{Any, Buffer, Size};
 use super::update::{MeasuredRow, Readings, Update};
 use super::{FilterError, Kalman};
 use crate::math::{Condition, Number};
@@ -257,26 +257,14 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         // Filters side by side have as many steps before their first rows.
         let steps = self.jobs[0].acting.steps_before();
         if steps > 0 {
+            let any = Any {
+                states: n,
+                outputs: self.size.outputs(),
+            };
             let mut state = FilterState::zero(n);
             state.set(self.copy.belief(n));
-            self.run_to_first_row(steps, &mut state);
+            Pass::new(any, self.jobs).run_to_first_row(steps, &mut state);
             self.copy.set(state.belief(n));
-        }
-    }
-
-    /// Carries the start to the first row.
-    #[cold]
-    fn run_to_first_row(&mut self, steps: usize, state: &mut FilterState<S, N>) {
-        let mut root = Root::new(self.size.states());
-        for i in 0..steps {
-            for (now, job) in self.now.iter_mut().zip(self.jobs) {
-                *now = job.acting.before(i);
-            }
-            self.set_noise(state);
-            self.carry(0, state, &mut root, &mut ());
-        }
-        for (now, job) in self.now.iter_mut().zip(self.jobs) {
-            *now = job.acting.at(0);
         }
     }
 
@@ -489,6 +477,21 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             FilterError::NoSpread { at }
         } else {
             FilterError::Diverged { at }
+        }
+    }
+}
+
+impl<N: FilterNumber> Pass<'_, Any, N> {
+    /// Carries the start to the first row. Compiled for no size of its own: these are few steps.
+    #[cold]
+    fn run_to_first_row(mut self, steps: usize, state: &mut FilterState<Any, N>) {
+        let mut root = Root::new(self.size.states());
+        for i in 0..steps {
+            for (now, job) in self.now.iter_mut().zip(self.jobs) {
+                *now = job.acting.before(i);
+            }
+            self.set_noise(state);
+            self.carry(0, state, &mut root, &mut ());
         }
     }
 }

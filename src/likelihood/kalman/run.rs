@@ -45,24 +45,21 @@ impl Kalman<'_> {
     ///
     /// [`FilterError`]: θ of another length, a twin that refuses it, a filter that diverged or has no spread.
     pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
-        self.run_into(theta, &mut ())
+        self.run(theta, &mut ())
     }
 
-    /// One pass over the record; the log-likelihood. The pass is compiled once for all sinks.
+    /// One pass over the record; the log-likelihood.
     pub(super) fn run(&self, theta: &[f64], sink: &mut dyn Sink) -> Result<f64, FilterError> {
-        self.run_into(theta, sink)
-    }
-
-    fn run_into<K: Sink + ?Sized>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
         self.run_in(&Order::of(self, theta)?, theta, sink)
     }
 
-    /// As [`run`](Self::run), the rows in this order.
-    pub(super) fn run_in<K: Sink + ?Sized>(
+    /// As [`run`](Self::run), the rows in this order. The pass is compiled once for all sinks: a pass costs what three calls a row do more,
+    /// and a sink of its own half a minute of compiling.
+    pub(super) fn run_in(
         &self,
         order: &Order<'_>,
         theta: &[f64],
-        sink: &mut K,
+        sink: &mut dyn Sink,
     ) -> Result<f64, FilterError> {
         let jobs = &[self.job(order, theta)?];
         let (states, outputs) = (self.states, self.channels);

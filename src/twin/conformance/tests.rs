@@ -138,6 +138,15 @@ fn a_step_that_is_too_long_is_named_by_output() {
     let finer = twin.stepped(|_, stepping| stepping.substeps = 64).unwrap();
     let fine = check_step(&finer, &[15.0], &drive).unwrap();
     assert_eq!(fine.severity, Severity::Pass, "{}", fine.message);
+    // A step that makes the run diverge is named as such; a run that would diverge with any step is not.
+    let wild = check_step(&twin, &[2e5], &drive).unwrap();
+    assert!(
+        wild.message.contains("the integrator adaptive"),
+        "{}",
+        wild.message
+    );
+    let growing = check_step(&twin, &[-2e5], &drive).unwrap();
+    assert!(growing.message.contains("not known"), "{}", growing.message);
     let boxed: Arc<dyn DigitalTwin> = Arc::new(Flawed(Flaw::None, AtomicU64::new(0)));
     assert!(check_step(&Twin::from(boxed), &[1.0, 1.0], &drive).is_none());
 }

@@ -8,7 +8,7 @@ use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
 use crate::likelihood::kalman::size::{Size, with_size};
 use crate::likelihood::kalman::update::Readings;
 use crate::likelihood::kalman::{FilterError, Kalman, Method, recoverable};
-use crate::math::{Kernel, LANES, Lanes, widest};
+use crate::math::{Kernel, LANES, Lanes, wide};
 use crate::twin::MOST_STATES;
 use rayon::prelude::*;
 
@@ -137,7 +137,7 @@ pub(in crate::likelihood::kalman) fn together(all: &[(&Kalman<'_>, &[f64])]) -> 
     let log_likelihoods = with_size!(
         (first.states, first.channels),
         [1 2 3 4],
-        |size| widest(SideBySide { size, jobs, to }),
+        |size| wide(SideBySide { size, jobs, to }).ok().flatten(),
         None
     )?;
     Some(Together {
