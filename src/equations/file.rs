@@ -238,10 +238,11 @@ impl Reader<'_> {
                 Some(value) => match value.get_ref().as_str() {
                     Some("zero") => Hold::Zero,
                     Some("linear") => Hold::Linear,
+                    Some("spline") => Hold::Spline,
                     Some("nearest") => Hold::Nearest,
                     Some("impulse") => Hold::Impulse,
                     _ => {
-                        let all = "\"zero\", \"linear\", \"nearest\" or \"impulse\"";
+                        let all = "\"zero\", \"linear\", \"spline\", \"nearest\" or \"impulse\"";
                         return entry.wrong("hold", value, all);
                     }
                 },

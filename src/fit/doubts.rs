@@ -127,6 +127,7 @@ impl Warning {
         let rule = match stepping.hold {
             Hold::Zero => "are held at the last sample (hold = \"zero\")",
             Hold::Linear => "move on a line (hold = \"linear\")",
+            Hold::Spline => "move on a smooth curve (hold = \"spline\")",
             Hold::Nearest => "are held at the nearest sample (hold = \"nearest\")",
             Hold::Impulse => "are amounts that are added at samples (hold = \"impulse\")",
         };

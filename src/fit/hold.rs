@@ -39,7 +39,7 @@ pub(crate) fn other_hold(
         return Ok(None);
     };
     let mut shown = vec![];
-    for hold in [Hold::Zero, Hold::Linear, Hold::Nearest] {
+    for hold in [Hold::Zero, Hold::Linear, Hold::Spline, Hold::Nearest] {
         let other = problem.stepped(Stepping { hold, ..own });
         let Some(other) = other.filter(|_| hold != own.hold) else {
             continue;
@@ -134,9 +134,35 @@ mod tests {
         let smooth = |t: f64| 1.0 + (0.7 * t).sin();
         for seed in 0..3 {
             assert_eq!(asked(Hold::Linear, smooth, seed), Some(Hold::Linear));
+            assert_eq!(asked(Hold::Spline, smooth, seed), Some(Hold::Spline));
             assert_eq!(asked(Hold::Zero, smooth, seed), None);
             assert_eq!(asked(Hold::Linear, |_| 1.0, seed), None);
             assert_eq!(asked(Hold::Zero, |t| (t / 20.0).floor() % 2.0, seed), None);
+        }
+    }
+
+    /// Two sines, of nine and of four samples a period, act as they are, and are known at samples alone: nothing is missing, and parameters are
+    /// those of the system. A line between samples takes a tenth off the gain.
+    #[test]
+    fn a_smooth_input_that_was_sampled_takes_nothing_off_the_parameters() {
+        const EACH: usize = 20;
+        let of = |t: f64| (0.35 * t).sin() + 0.8 * (0.78 * t + 1.0).sin();
+        let fine = Signal::from_shape_fn((150 * EACH, 1), |(k, _)| of(0.1 * (k as f64 + 0.5)));
+        let (fine, twin) = (Drive::new(0.1, fine).unwrap(), Twin::new(room()));
+        let truth = [2.0, 3.0];
+        for seed in 0..3 {
+            let run = twin.simulate(&truth, &fine, Noise::new(seed, "smooth", 0));
+            let outputs = run.unwrap().slice(ndarray::s![..;EACH, ..]).to_owned();
+            let inputs = Signal::from_shape_fn((150, 1), |(k, _)| of(2.0 * k as f64));
+            let record = Record::new(Drive::new(2.0, inputs).unwrap(), outputs).unwrap();
+            let study = Study::of(room()).unwrap();
+            let fit = study.fit(std::slice::from_ref(&record)).unwrap();
+            let hold = fit.stepping.map(|stepping| stepping.hold);
+            assert_eq!(hold, Some(Hold::Spline));
+            for (parameter, truth) in fit.parameters.iter().zip(truth) {
+                let off = (parameter.value - truth).abs();
+                assert!(off < 4.0 * parameter.std_error, "{parameter:?}");
+            }
         }
     }
 }

@@ -31,7 +31,7 @@ const MOST: u64 = 1 << 20;
 /// step = 4.0
 /// samples = 1024
 /// input = { levels = [0.5, 6.0], hold = 25 }   # or a file: "U.csv"; or a plan for each input: { u = 2.0 }
-/// hold = "linear"   # inputs on the line between samples; "nearest" holds the nearest, "zero" the last
+/// hold = "linear"   # inputs on the line between samples; "spline" puts them on a smooth curve, "nearest" holds the nearest, "zero" the last
 /// integrator = "runge-kutta-4"   # or "euler"
 /// substeps = 4      # steps of the integrator within a sample
 /// columns = { t = "time", u = "pump", y = "level" }   # of measured records
@@ -369,7 +369,7 @@ mod tests {
             ("twin = \n", "s.toml, line 1"),
             (
                 "twin = 'x'\n[record]\nhold = 'cubic'\n",
-                "s.toml, line 3: unknown value `cubic`, expected one of `zero`, `linear`, `nearest`",
+                "s.toml, line 3: unknown value `cubic`, expected one of `zero`, `linear`, `nearest`, `spline`",
             ),
             (
                 "twin = 'x'\n[record.input]\nu1 = 1\nu2 = { levels = [2, 1], hold = 3 }\n",

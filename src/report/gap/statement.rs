@@ -397,6 +397,7 @@ pub(super) fn other_step(diagnosis: &Diagnosis) -> Option<[String; 2]> {
         let rule = match hold {
             Hold::Zero => "zero",
             Hold::Linear => "linear",
+            Hold::Spline => "spline",
             Hold::Nearest => "nearest",
             Hold::Impulse => "impulse",
         };

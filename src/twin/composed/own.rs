@@ -141,7 +141,9 @@ fn are_together(now: &[Now<'_>]) -> bool {
     now.iter().all(|now| {
         let times = [now.t, now.dt, now.first_time, now.begun];
         let is_between = match (now.between, first.between) {
-            (Some(own), Some(other)) => own.next == other.next && own.holds == other.holds,
+            (Some(own), Some(other)) => {
+                (own.next, own.holds, own.bends) == (other.next, other.holds, other.bends)
+            }
             (own, other) => own.is_none() && other.is_none(),
         };
         times == [first.t, first.dt, first.first_time, first.begun]

@@ -2,7 +2,7 @@
 
 use super::Composed;
 use super::parts::Theta;
-use crate::record::{Drive, Signal};
+use crate::record::{Bends, Drive, Signal};
 use crate::setting::number;
 use crate::twin::integrator::{Between, remove_amounts};
 use crate::twin::{Hold, Interval, Noise, Now, Outline, SimulationError, Workspace};
@@ -83,6 +83,7 @@ pub(crate) struct Acting<'d> {
     drive: Cow<'d, Drive>,
     /// Rule of each input between samples; empty where all are held.
     holds: Vec<Hold>,
+    bends: Bends,
     /// Inputs before the first row, which no amount is added at; empty where the start is that row.
     inputs_before: Vec<f64>,
     /// All of θ, held entries too.
@@ -113,6 +114,7 @@ impl<'d> Acting<'d> {
         Ok(Self {
             before,
             inputs_before,
+            bends: Bends::of(&drive, holds.contains(&Hold::Spline)),
             drive,
             holds,
             theta: twin.complete(theta),
@@ -121,9 +123,11 @@ impl<'d> Acting<'d> {
 
     /// The drive as it is recorded.
     pub(super) fn plain(theta: &[f64], drive: &'d Drive, holds: Vec<Hold>) -> Self {
+        let holds = between(holds);
         Self {
+            bends: Bends::of(drive, holds.contains(&Hold::Spline)),
             drive: Cow::Borrowed(drive),
-            holds: between(holds),
+            holds,
             inputs_before: vec![],
             theta: Theta::from_slice(theta),
             before: LeadIn {
@@ -199,8 +203,11 @@ impl<'d> Acting<'d> {
         }
         if !self.holds.is_empty() {
             let next = drive.input((k + 1).min(drive.samples() - 1));
-            let holds = &self.holds;
-            now.between = Some(Between { next, holds });
+            now.between = Some(Between {
+                next,
+                holds: &self.holds,
+                bends: self.bends.behind(k),
+            });
         }
     }
 }

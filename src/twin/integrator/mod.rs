@@ -63,17 +63,26 @@ pub(crate) struct Between<'a> {
     pub next: &'a [f64],
     /// Rule of each input between this sample and the next.
     pub holds: &'a [Hold],
+    /// What [bends](crate::record::Bends) each input away from the line, here and at the next sample; empty where none is on a spline.
+    pub bends: &'a [f64],
 }
 
 impl Between<'_> {
     /// Inputs at a share of the way to the next sample, in a step whose middle is at another.
     pub fn inputs_at(&self, at: f64, middle: f64, u: &[f64], to: &mut [f64]) {
-        for (((to, u), next), hold) in to.iter_mut().zip(u).zip(self.next).zip(self.holds) {
+        let rules = self.holds.iter().enumerate();
+        for (((to, u), next), (j, hold)) in to.iter_mut().zip(u).zip(self.next).zip(rules) {
             *to = match hold {
                 Hold::Zero => *u,
                 Hold::Impulse => 0.0,
                 hold => u + hold.share(at, middle) * (next - u),
             };
+            if *hold == Hold::Spline
+                && let [here, there] = self.bends[2 * j..2 * j + 2]
+            {
+                let left = 1.0 - at;
+                *to += (left.powi(3) - left) * here + (at.powi(3) - at) * there;
+            }
         }
     }
 
@@ -116,6 +125,8 @@ pub enum Hold {
     /// Held at the value of the nearest sample: what a smooth input does that was sampled, and not held. With an odd number of substeps, the
     /// middle one has the mean of both; the last is held.
     Nearest,
+    /// On the natural cubic spline through all samples: a smooth input that was sampled several times a period. The last is held.
+    Spline,
     /// An amount that is added at its row, a dose: the states jump by ∂f/∂u times it, and between samples the input is zero. In discrete
     /// time it is held: the next state is told the amount.
     Impulse,
@@ -126,7 +137,7 @@ impl Hold {
     fn share(self, at: f64, middle: f64) -> f64 {
         match self {
             Self::Zero | Self::Impulse => 0.0,
-            Self::Linear => at,
+            Self::Linear | Self::Spline => at,
             Self::Nearest => match middle.total_cmp(&0.5) {
                 Ordering::Less => 0.0,
                 Ordering::Equal => 0.5,

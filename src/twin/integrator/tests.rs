@@ -293,6 +293,7 @@ fn amounts_are_added_at_their_rows() {
         let between = Between {
             next: &[0.0, 3.0],
             holds: &holds,
+            bends: &[],
         };
         let now = Now {
             between: Some(between),

@@ -4,8 +4,8 @@ use super::{RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, Moment, above};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::math::nearest;
-use crate::record::{Drive, Signal};
-use crate::twin::{Acting, Between, Composed, DeadTime, Interval, Noise, Now};
+use crate::record::{Bends, Drive, Signal};
+use crate::twin::{Acting, Between, Composed, DeadTime, Hold, Interval, Noise, Now};
 use ndarray::ArrayView1;
 
 /// Makes a record; `None` where a state diverges.
@@ -38,6 +38,9 @@ pub(super) fn run(
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let (mut y, mut rate) = (vec![0.0; p], vec![0.0; n]);
     let mut dead_time = DeadTime::of(twin, system.theta, drive.dt());
+    let holds = twin.holds();
+    // Of the record's inputs: what departs moves the ends of a curve.
+    let bends = Bends::of(drive, holds.contains(&Hold::Spline));
     for k in 0..samples {
         let (t, dt) = (drive.time(k), drive.step(k));
         let mut command = drive.input(k).to_vec();
@@ -70,7 +73,7 @@ pub(super) fn run(
         }
         twin.update(&now, &mut x);
         // The next sample's inputs, towards which these go where the twin says so.
-        let next = match k + 1 < samples {
+        let next: Vec<f64> = match k + 1 < samples {
             true => {
                 let (from, to) = (drive.input(k), drive.input(k + 1));
                 (u.iter().zip(from.iter().zip(to)))
@@ -79,7 +82,12 @@ pub(super) fn run(
             }
             false => u.clone(),
         };
-        plant.advance(&now, &next, &command, &mut x);
+        let between = Between {
+            next: &next,
+            holds: &holds,
+            bends: bends.behind(k),
+        };
+        plant.advance(&now, between, &command, &mut x);
         for ((x, q), noise) in x.iter_mut().zip(&q).zip(&mut process) {
             *x += draws.sign * conditions.process * q * noise.next();
         }
@@ -203,14 +211,9 @@ impl Plant<'_> {
     }
 
     /// Carries the state to the next sample.
-    fn advance(&mut self, now: &Now<'_>, next: &[f64], command: &[f64], x: &mut [f64]) {
+    fn advance(&mut self, now: &Now<'_>, between: Between<'_>, command: &[f64], x: &mut [f64]) {
         let h = now.dt / TRIAL.world_substeps as f64;
         let mut inputs = now.u.to_vec();
-        let holds = self.twin.holds();
-        let between = Between {
-            next,
-            holds: &holds,
-        };
         let mut drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.twin.drift(now, x, dx);
         between.jump(now, x, &mut inputs, &mut drift);
         for step in 0..TRIAL.world_substeps {

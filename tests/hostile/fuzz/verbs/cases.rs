@@ -93,7 +93,7 @@ const TABLES: [&str; 30] = [
 ];
 
 /// Keys of the table of records.
-const RECORD: [&str; 16] = [
+const RECORD: [&str; 17] = [
     "substeps = 7",
     "substeps = 0",
     "tolerance = 1e-14",
@@ -104,6 +104,7 @@ const RECORD: [&str; 16] = [
     "integrator = \"discrete\"",
     "hold = \"linear\"",
     "hold = \"nearest\"",
+    "hold = \"spline\"",
     "hold = \"impulse\"",
     "hold = { u = \"impulse\" }",
     "samples = 3",
