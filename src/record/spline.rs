@@ -3,7 +3,7 @@
 use super::Drive;
 use ndarray::Array2;
 
-/// What bends inputs away from the lines between samples.
+/// Bends of inputs away from the lines between samples.
 ///
 /// For row k and input j, columns 2·j and 2·j + 1 hold h²/6 times the second derivative of the natural cubic spline at row k and at the next row,
 /// h the step between them. At a share s of the way, r = 1 − s, the spline is

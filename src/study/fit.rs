@@ -244,7 +244,7 @@ mod tests {
         (fixed, [Record::new(drive, outputs.unwrap()).unwrap()])
     }
 
-    /// Whether a fit goes wrong or ends, the step is told as the reason; what diverges by it alone is not told as the twin's fault.
+    /// The step is told as the reason, whether a fit goes wrong or ends; what diverges by it alone is not told as the twin's fault.
     #[test]
     fn a_step_that_the_twin_cannot_take_is_the_reason() {
         let brusselator = "[twin]\nname = 'brusselator'\n\

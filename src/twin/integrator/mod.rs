@@ -63,7 +63,7 @@ pub(crate) struct Between<'a> {
     pub next: &'a [f64],
     /// Rule of each input between this sample and the next.
     pub holds: &'a [Hold],
-    /// What [bends](crate::record::Bends) each input away from the line, here and at the next sample; empty where none is on a spline.
+    /// [Bends](crate::record::Bends) of each input, here and at the next sample; empty where none is on a spline.
     pub bends: &'a [f64],
 }
 
