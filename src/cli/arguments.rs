@@ -34,7 +34,7 @@ pub(super) struct Arguments {
 
 /// Exit codes, at the end of every `--help`.
 const EXIT: &str = "Exit codes: 0 done; 2 wrong call or file (one line names the problem, the place and the remedy); 130 stopped by Ctrl-C; \
-     1 internal error.";
+     1 a twin that fails its check, or an internal error.";
 
 /// Creates the whole command line.
 pub(super) fn command() -> Command {
