@@ -30,7 +30,7 @@ pub(in crate::diagnose) struct Base {
     pub scales: Scales,
     pub frequencies: Vec<f64>,
     /// Inputs that react to an output of the same row.
-    pub reacting: Vec<String>,
+    pub reacting: Vec<usize>,
     /// Places whose noise level is fitted.
     pub noisy: Vec<String>,
     /// `true` for a black box without noise of its own.
@@ -185,11 +185,10 @@ impl Base {
     fn of(model: Model) -> Result<Self, StudyError> {
         let (theta, outline) = (model.theta(), model.problem.outline());
         let records = model.problem.records.clone();
-        let inputs: Vec<String> = outline.inputs.iter().map(|u| u.name.clone()).collect();
         let seen = model.problem.states(&model.fitted.theta)?;
         let (filtered, states): (Vec<_>, Vec<_>) = seen.into_iter().unzip();
         Ok(Self {
-            reacting: reacting(&filtered, &records, &inputs),
+            reacting: reacting(&filtered, &records),
             scales: Scales::new(&model.base, &theta, records, states, outline),
             frequencies: frequencies(&model)?,
             noisy: vec![],

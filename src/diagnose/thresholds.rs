@@ -18,6 +18,11 @@ numbers! {
         rare_term: f64 = 0.1,
         /// Level of both tests for feedback: chance takes one open loop in 10⁴ for a closed one, of inputs that also hold the noise by chance.
         feedback_level: f64 = 1e-4,
+        /// Size over the median one from which a rest of an input is a jump: of normal rests one in 10⁶ is. Half cuts normal ones off, twice
+        /// leaves small jumps.
+        feedback_jump: f64 = 7.5,
+        /// Rounds in which jumps are left out, the smaller ones once the larger are gone; a third round hardly finds any.
+        feedback_rounds: usize = 2,
         // Maps of residuals: descriptions.
         /// Standard deviations above white noise of a cell that stands out.
         notable: f64 = 4.0,

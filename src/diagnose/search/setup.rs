@@ -10,7 +10,6 @@ use crate::diagnose::prior::inside;
 use crate::diagnose::settings::{Ablation, DiagnoseSettings};
 use crate::diagnose::step::{OtherStep, other_step};
 use crate::diagnose::thresholds::THRESHOLDS;
-use crate::effect::{TargetKind, targets};
 use crate::fit::Passes;
 use crate::hypothesis::noise::kinds;
 use crate::hypothesis::scales::Scales;
@@ -200,11 +199,7 @@ impl<'s> Setup<'s> {
         let models = question.from.iter().filter_map(|set| known.model(set));
         let seen = models.map(states).collect::<Result<Vec<_>, _>>()?;
         let mut all = unknown(&self.base.library(), &seen);
-        let sensors = targets(TargetKind::Sensor, None, &self.base.model.base.signals());
-        all.retain(|term| {
-            let is_sensor = sensors.contains(&term.target);
-            !explains_noise(term, is_sensor, &self.base.reacting)
-        });
+        all.retain(|term| !explains_noise(term, &self.base.reacting));
         Ok(chosen(shared(all), question))
     }
 
