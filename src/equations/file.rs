@@ -235,17 +235,19 @@ impl Reader<'_> {
             self.outline.inputs.push(quantity(entry, keys)?);
             let own = match keys.get("hold") {
                 None => Hold::Zero,
-                Some(value) => match value.get_ref().as_str() {
-                    Some("zero") => Hold::Zero,
-                    Some("linear") => Hold::Linear,
-                    Some("spline") => Hold::Spline,
-                    Some("nearest") => Hold::Nearest,
-                    Some("impulse") => Hold::Impulse,
-                    _ => {
-                        let all = "\"zero\", \"linear\", \"spline\", \"nearest\" or \"impulse\"";
-                        return entry.wrong("hold", value, all);
+                Some(value) => {
+                    let word = value.get_ref().as_str();
+                    let mut rules = Hold::NAMES.iter();
+                    match rules.find(|(_, name)| word == Some(*name)) {
+                        Some((hold, _)) => *hold,
+                        None => {
+                            let [all @ .., last] =
+                                &Hold::NAMES.map(|(_, name)| format!("\"{name}\""));
+                            let all = format!("{} or {last}", all.join(", "));
+                            return entry.wrong("hold", value, &all);
+                        }
                     }
-                },
+                }
             };
             holds.insert(entry.name.to_owned(), own);
         }

@@ -125,11 +125,11 @@ impl Warning {
     /// A rule for inputs between samples that is not the study's.
     pub(crate) fn hold(stepping: Stepping, gain: Option<f64>) -> Self {
         let rule = match stepping.hold {
-            Hold::Zero => "are held at the last sample (hold = \"zero\")",
-            Hold::Linear => "move on a line (hold = \"linear\")",
-            Hold::Spline => "move on a smooth curve (hold = \"spline\")",
-            Hold::Nearest => "are held at the nearest sample (hold = \"nearest\")",
-            Hold::Impulse => "are amounts that are added at samples (hold = \"impulse\")",
+            Hold::Zero => "are held at the last sample",
+            Hold::Linear => "move on a line",
+            Hold::Spline => "move on a smooth curve",
+            Hold::Nearest => "are held at the nearest sample",
+            Hold::Impulse => "are amounts that are added at samples",
         };
         let substeps = match stepping.substeps {
             1 => String::new(),
@@ -141,7 +141,10 @@ impl Warning {
                 number(three_digits(gain))
             )
         });
-        let what = format!("between samples, inputs {rule}{gain}; this is used{substeps}");
+        let name = stepping.hold.name();
+        let what = format!(
+            "between samples, inputs {rule} (hold = \"{name}\"){gain}; this is used{substeps}"
+        );
         Self::new("inputs-between-samples", what)
     }
 

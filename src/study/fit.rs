@@ -12,7 +12,7 @@ use crate::likelihood::{Beliefs, measured, with_better_start};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
-use crate::twin::conformance::coarse_step;
+use crate::twin::conformance::blamed_step;
 use crate::twin::{Noise, NoiseLevel, StartLevel, Stepping, Twin};
 use std::time::Instant;
 
@@ -152,10 +152,8 @@ impl Study {
         let fault = |record: &Record| {
             let drive = record.drive();
             let error = self.twin.simulate(&centre, drive, Noise::OFF).err()?;
-            Some(match coarse_step(&self.twin, &centre, drive) {
-                Some(Ok(Some(coarse))) => format!("the step is {coarse}"),
-                _ => error.to_string(),
-            })
+            let blamed = blamed_step(&self.twin, &centre, drive);
+            Some(blamed.map_or(error.to_string(), |blamed| format!("the step is {blamed}")))
         };
         let cause = records.iter().find_map(fault);
         let cause = cause.map_or(String::new(), |cause| {

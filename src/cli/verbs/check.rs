@@ -43,11 +43,12 @@ impl Verb for Check {
         let twin = (study.twin())
             .watched(move || (counter.tick()).map_err(|stop| SimulationError::Fatal(stop.into())));
         let mut findings = check(&twin, &drive, context.seed);
-        let step = match passes(&findings) {
-            true => check_step,
-            false => blamed_step,
-        };
-        findings.extend(step(&twin, &twin.parameters().centre(), &drive));
+        let centre = twin.parameters().centre();
+        if passes(&findings) {
+            findings.extend(check_step(&twin, &centre, &drive));
+        } else if let Some(blamed) = blamed_step(&twin, &centre, &drive) {
+            findings.push(Finding::warning("step", blamed));
+        }
         stage.finish();
         context.progress.checkpoint().map_err(Failure::internal)?;
         if passes(&findings) {

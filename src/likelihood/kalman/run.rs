@@ -53,8 +53,8 @@ impl Kalman<'_> {
         self.run_in(&Order::of(self, theta)?, theta, sink)
     }
 
-    /// As [`run`](Self::run), the rows in this order. The pass is compiled once for all sinks: a pass costs what three calls a row do more,
-    /// and a sink of its own half a minute of compiling.
+    /// As [`run`](Self::run), the rows in this order. The pass is compiled once for all sinks, whose calls
+    /// are few beside a row's work.
     pub(super) fn run_in(
         &self,
         order: &Order<'_>,

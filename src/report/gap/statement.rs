@@ -6,7 +6,7 @@ use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, THRESHOLD
 use crate::report::NEXT_INPUT;
 use crate::report::digits::{SHOWN, chance, percent, short, with_unit};
 use crate::report::units::Units;
-use crate::twin::{Hold, Integrator};
+use crate::twin::Integrator;
 
 const APART: &str = "this record cannot tell which";
 
@@ -394,14 +394,7 @@ pub(super) fn other_step(diagnosis: &Diagnosis) -> Option<[String; 2]> {
         wrong.push("the twin's own step is too long for this record");
     }
     if let Some(hold) = diagnosis.hold {
-        let rule = match hold {
-            Hold::Zero => "zero",
-            Hold::Linear => "linear",
-            Hold::Spline => "spline",
-            Hold::Nearest => "nearest",
-            Hold::Impulse => "impulse",
-        };
-        settings.push(format!("hold \"{rule}\""));
+        settings.push(format!("hold \"{}\"", hold.name()));
         wrong.push("its inputs move otherwise between samples");
     }
     (!settings.is_empty()).then(|| [settings.join(" with "), wrong.join(", and ")])

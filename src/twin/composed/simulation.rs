@@ -2,9 +2,9 @@
 
 use super::Composed;
 use super::parts::Theta;
-use crate::record::{Bends, Drive, Signal};
+use crate::record::{Drive, Signal};
 use crate::setting::number;
-use crate::twin::integrator::{Between, remove_amounts};
+use crate::twin::integrator::{Bends, Between, remove_amounts};
 use crate::twin::{Hold, Interval, Noise, Now, Outline, SimulationError, Workspace};
 use std::borrow::Cow;
 
@@ -114,7 +114,7 @@ impl<'d> Acting<'d> {
         Ok(Self {
             before,
             inputs_before,
-            bends: Bends::of(&drive, holds.contains(&Hold::Spline)),
+            bends: Bends::of(&drive, &holds),
             drive,
             holds,
             theta: twin.complete(theta),
@@ -125,7 +125,7 @@ impl<'d> Acting<'d> {
     pub(super) fn plain(theta: &[f64], drive: &'d Drive, holds: Vec<Hold>) -> Self {
         let holds = between(holds);
         Self {
-            bends: Bends::of(drive, holds.contains(&Hold::Spline)),
+            bends: Bends::of(drive, &holds),
             drive: Cow::Borrowed(drive),
             holds,
             inputs_before: vec![],

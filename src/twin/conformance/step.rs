@@ -45,10 +45,17 @@ pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Fi
     Some(Finding::of("step", outcome))
 }
 
-/// The step, where it alone makes runs at θ fail.
-pub(crate) fn blamed_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Finding> {
-    let coarse = coarse_step(twin, theta, drive)?.ok()??;
-    Some(Finding::of("step", warned(coarse)))
+/// The step's fault and remedy where a run at θ diverges with the twin's own fixed steps, and one to a tolerance does not.
+pub(crate) fn blamed_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<&'static str> {
+    let (own, _) = twin.integration()?;
+    if !matches!(own, Integrator::Euler | Integrator::RungeKutta4) {
+        return None;
+    }
+    let error = twin.free_run(theta, drive).err()?;
+    let adaptive = twin.stepped(|rule, _| *rule = Integrator::Adaptive)?;
+    (error.costs_one_run() && adaptive.free_run(theta, drive).is_ok()).then_some(
+        "too long: the run diverges, with steps to a tolerance it does not; give the study the integrator adaptive",
+    )
 }
 
 /// Outputs that half of the step moves by more than their noise, with the remedy; `None` for a black box.
@@ -62,13 +69,10 @@ pub(crate) fn coarse_step(
         .and_then(|errors| Ok((errors, step_levels(equations, theta, drive)?)));
     let (errors, levels) = match known {
         Ok(known) => known,
-        Err(error) if error.costs_one_run() && runs_to_tolerance(twin, theta, drive) => {
-            return Some(Ok(Some(
-                "too long: the run diverges, with steps to a tolerance it does not; give the study the integrator adaptive"
-                    .into(),
-            )));
+        Err(error) => {
+            let blamed = blamed_step(twin, theta, drive);
+            return Some(blamed.map_or(Err(error), |blamed| Ok(Some(blamed.into()))));
         }
-        Err(error) => return Some(Err(error)),
     };
     let units = twin.signals().outputs.into_iter().map(|output| output.unit);
     let coarse: Vec<String> = (errors.iter().zip(&levels).zip(units))
@@ -102,14 +106,6 @@ pub(crate) fn coarse_step(
         "too long: with half the step, {}; give the study {substeps} substeps, or the integrator {finer}",
         coarse.join("; ")
     ))))
-}
-
-/// Returns whether fixed steps are to blame for a run that diverges: one to a tolerance does not.
-fn runs_to_tolerance(twin: &Twin, theta: &[f64], drive: &Drive) -> bool {
-    let is_fixed = |rule| matches!(rule, Integrator::Euler | Integrator::RungeKutta4);
-    let own = twin.integration().filter(|(rule, _)| is_fixed(*rule));
-    let adaptive = own.and_then(|_| twin.stepped(|rule, _| *rule = Integrator::Adaptive));
-    adaptive.is_some_and(|adaptive| adaptive.free_run(theta, drive).is_ok())
 }
 
 /// Limit of each output's move, and the limit's name.

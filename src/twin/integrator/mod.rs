@@ -6,6 +6,7 @@ mod pair;
 mod path;
 mod rosenbrock;
 mod schedule;
+mod spline;
 #[cfg(test)]
 mod tests;
 mod watch;
@@ -20,6 +21,7 @@ use std::ops::RangeInclusive;
 
 pub use event::Event;
 pub use schedule::StepsTaken;
+pub(crate) use spline::Bends;
 pub(crate) use watch::EventCalls;
 
 /// Time, step, inputs and parameters at which equations are evaluated.
@@ -63,7 +65,7 @@ pub(crate) struct Between<'a> {
     pub next: &'a [f64],
     /// Rule of each input between this sample and the next.
     pub holds: &'a [Hold],
-    /// [Bends](crate::record::Bends) of each input, here and at the next sample; empty where none is on a spline.
+    /// [`Bends`] of each input, here and at the next sample; empty where none is on a spline.
     pub bends: &'a [f64],
 }
 
@@ -72,17 +74,16 @@ impl Between<'_> {
     pub fn inputs_at(&self, at: f64, middle: f64, u: &[f64], to: &mut [f64]) {
         let rules = self.holds.iter().enumerate();
         for (((to, u), next), (j, hold)) in to.iter_mut().zip(u).zip(self.next).zip(rules) {
+            let on_line = || u + hold.share(at, middle) * (next - u);
             *to = match hold {
                 Hold::Zero => *u,
                 Hold::Impulse => 0.0,
-                hold => u + hold.share(at, middle) * (next - u),
+                Hold::Linear | Hold::Nearest => on_line(),
+                Hold::Spline => {
+                    let (left, bends) = (1.0 - at, &self.bends[2 * j..]);
+                    on_line() + ((left.powi(3) - left) * bends[0] + (at.powi(3) - at) * bends[1])
+                }
             };
-            if *hold == Hold::Spline
-                && let [here, there] = self.bends[2 * j..2 * j + 2]
-            {
-                let left = 1.0 - at;
-                *to += (left.powi(3) - left) * here + (at.powi(3) - at) * there;
-            }
         }
     }
 
@@ -133,6 +134,22 @@ pub enum Hold {
 }
 
 impl Hold {
+    /// All rules, each with its name in files.
+    pub(crate) const NAMES: [(Self, &str); 5] = [
+        (Self::Zero, "zero"),
+        (Self::Linear, "linear"),
+        (Self::Spline, "spline"),
+        (Self::Nearest, "nearest"),
+        (Self::Impulse, "impulse"),
+    ];
+
+    /// Name in files.
+    pub(crate) fn name(self) -> &'static str {
+        let mut all = Self::NAMES.iter();
+        all.find(|(hold, _)| *hold == self)
+            .map_or("", |(_, name)| *name)
+    }
+
     /// Share of the next sample's input at a share of the way, in a step whose middle is at another.
     fn share(self, at: f64, middle: f64) -> f64 {
         match self {

@@ -4,8 +4,8 @@ use super::{RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, Moment, above};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::math::nearest;
-use crate::record::{Bends, Drive, Signal};
-use crate::twin::{Acting, Between, Composed, DeadTime, Hold, Interval, Noise, Now};
+use crate::record::{Drive, Signal};
+use crate::twin::{Acting, Bends, Between, Composed, DeadTime, Interval, Noise, Now};
 use ndarray::ArrayView1;
 
 /// Makes a record; `None` where a state diverges.
@@ -40,7 +40,7 @@ pub(super) fn run(
     let mut dead_time = DeadTime::of(twin, system.theta, drive.dt());
     let holds = twin.holds();
     // Of the record's inputs: what departs moves the ends of a curve.
-    let bends = Bends::of(drive, holds.contains(&Hold::Spline));
+    let bends = Bends::of(drive, &holds);
     for k in 0..samples {
         let (t, dt) = (drive.time(k), drive.step(k));
         let mut command = drive.input(k).to_vec();

@@ -1,6 +1,7 @@
 //! The cubic spline through a smooth signal that was sampled.
 
-use super::Drive;
+use super::Hold;
+use crate::record::Drive;
 use ndarray::Array2;
 
 /// Bends of inputs away from the lines between samples.
@@ -17,9 +18,9 @@ use ndarray::Array2;
 pub(crate) struct Bends(Option<Array2<f64>>);
 
 impl Bends {
-    /// Those of a drive; none where no input is on a spline.
-    pub fn of(drive: &Drive, is_wanted: bool) -> Self {
-        Self(is_wanted.then(|| bends(drive)))
+    /// Those of a drive under these rules; none where no input is on a spline.
+    pub fn of(drive: &Drive, holds: &[Hold]) -> Self {
+        Self(holds.contains(&Hold::Spline).then(|| bends(drive)))
     }
 
     /// Behind row k; empty where no input is on a spline.
