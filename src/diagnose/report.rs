@@ -262,6 +262,7 @@ impl Report<'_> {
         let predictive = Predictive {
             model,
             declared: declared(self.study.twin(), &model.problem),
+            is_open_loop: self.found.evidence.base.reacting.is_empty(),
             draws: &draws,
             noise,
         };

@@ -21,6 +21,8 @@ numbers! {
         /// Size over the median one from which a rest of an input is a jump: of normal rests one in 10⁶ is. Half cuts normal ones off, twice
         /// leaves small jumps.
         feedback_jump: f64 = 7.5,
+        /// Share of an input below which its rest is rounding, not what a controller makes of noise. Half and twice: the same of all inputs here.
+        feedback_rest: f64 = 1e-6,
         /// Rounds in which jumps are left out, the smaller ones once the larger are gone; a third round hardly finds any.
         feedback_rounds: usize = 2,
         // Maps of residuals: descriptions.

@@ -6,8 +6,8 @@
 //!
 //! ```text
 //! z_s = (mean T_s of the measured records − mean T_s of simulated ones)/deviation of simulated ones
-//! p   = share of simulated records with max_s as large: of |z_s|, of z_s where less than usual is no fault (bursts, correlation); tails are
-//!       told, and no fault
+//! p   = share of simulated records with max_s as large: of |z_s|, of z_s where less than usual is no fault (bursts, correlation); tails, and
+//!       predictions in a closed loop, are told, and no fault
 //! ```
 //!
 //! The largest z has its own distribution here, so the number of statistics does not matter. Simulations end early where many have as
@@ -47,6 +47,8 @@ pub(in crate::diagnose) struct Predictive<'m> {
     pub model: &'m Model,
     /// Places whose noise level is declared.
     pub declared: Vec<String>,
+    /// `true` where no input reacts to an output.
+    pub is_open_loop: bool,
     /// Draws of its posterior.
     pub draws: &'m PosteriorSample,
     pub noise: Noise,
@@ -59,7 +61,7 @@ impl Predictive<'_> {
         if problem.is_simulated() || self.draws.thetas.is_empty() {
             return Ok(None);
         }
-        let statistics = Discrepancy::all(problem, self.correlated().is_empty());
+        let statistics = Discrepancy::all(problem, self.correlated().is_empty(), self.is_open_loop);
         let measured = self.measured(&statistics)?;
         let mut simulated: Vec<Look> = vec![];
         let mut compared = None;

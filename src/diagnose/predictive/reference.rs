@@ -54,14 +54,15 @@ impl Predictive<'_> {
         all.iter().map(|(.., size)| *size).collect()
     }
 
-    /// Share of the output's variance that noise beyond the reference puts into predictions as far ahead as windows of the record reach.
+    /// Share of the output's variance that noise beyond the reference puts into predictions as far ahead as windows of the record reach; `None`
+    /// where there is none, and in a closed loop, where predictions do not count.
     pub(super) fn noise_share(
         &self,
         statistics: &[Discrepancy],
         simulated: &[Look],
     ) -> Result<Option<f64>, StudyError> {
         let (theta, is_other) = self.reference();
-        if !is_other {
+        if !is_other || !self.is_open_loop {
             return Ok(None);
         }
         let Some(at) = statistics.iter().rposition(Discrepancy::is_window) else {

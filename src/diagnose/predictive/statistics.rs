@@ -27,15 +27,21 @@ pub(super) enum Discrepancy {
     },
     Tails(String),
     Bursts(String),
-    Error(Reach, f64),
+    /// It counts where no input reacts: a simulated record has the inputs of the measured one, without a controller that answers it, and may
+    /// go where the loop does not let the system go.
+    Error {
+        reach: Reach,
+        dt: f64,
+        counts: bool,
+    },
 }
 
 /// Values of all statistics; NaN where one has no meaning.
 pub(super) type Look = Vec<f64>;
 
 impl Discrepancy {
-    /// All that are looked at.
-    pub fn all(problem: &Problem, is_white: bool) -> Vec<Self> {
+    /// All that are looked at; `is_white` where the fit knows no correlated noise, `is_open` where no input reacts to an output.
+    pub fn all(problem: &Problem, is_white: bool, is_open: bool) -> Vec<Self> {
         let outputs = problem.outline().outputs.into_iter();
         let mut all: Vec<Self> = outputs
             .flat_map(|output| {
@@ -56,7 +62,11 @@ impl Discrepancy {
         let further = reaches(problem, HeldOutRows { record, from: 0 })
             .into_iter()
             .skip(1);
-        all.extend(further.map(|reach| Self::Error(reach, record.drive().dt())));
+        all.extend(further.map(|reach| Self::Error {
+            reach,
+            dt: record.drive().dt(),
+            counts: is_open,
+        }));
         all
     }
 
@@ -64,15 +74,20 @@ impl Discrepancy {
     /// noise is no gap, and neither are tails. Independent noise may have any; what comes in bursts or moves predictions shows elsewhere.
     pub fn departure(&self, deviations: f64) -> f64 {
         match self {
-            Self::Spread(_) | Self::Error(..) => deviations.abs(),
-            Self::Whiteness { counts: false, .. } | Self::Tails(_) => 0.0,
+            Self::Whiteness { counts: false, .. }
+            | Self::Error { counts: false, .. }
+            | Self::Tails(_) => 0.0,
+            Self::Spread(_) | Self::Error { .. } => deviations.abs(),
             Self::Whiteness { .. } | Self::Bursts(_) => deviations.max(0.0),
         }
     }
 
     /// Returns whether it is the error of windows, and no free run's.
     pub fn is_window(&self) -> bool {
-        matches!(self, Self::Error(Reach::Samples(_), _))
+        let Self::Error { reach, .. } = self else {
+            return false;
+        };
+        matches!(reach, Reach::Samples(_))
     }
 
     /// Name in reports.
@@ -82,17 +97,19 @@ impl Discrepancy {
             Self::Whiteness { output, .. } => format!("whiteness of {output}"),
             Self::Tails(output) => format!("tails of {output}"),
             Self::Bursts(output) => format!("bursts of {output}"),
-            Self::Error(Reach::FreeRun, _) => "error of the free run".into(),
-            Self::Error(Reach::Samples(h), dt) => {
-                format!("error {} s ahead", crate::math::six_digits(*h as f64 * dt))
-            }
+            Self::Error { reach, dt, .. } => match reach {
+                Reach::FreeRun => "error of the free run".into(),
+                Reach::Samples(h) => {
+                    format!("error {} s ahead", crate::math::six_digits(*h as f64 * dt))
+                }
+            },
         }
     }
 
     /// The value as it is reported: errors as root mean squares, all else as it is in the table above without its logarithm.
     pub fn shown(&self, value: f64) -> f64 {
         match self {
-            Self::Error(..) | Self::Spread(_) => (0.5 * value).exp(),
+            Self::Error { .. } | Self::Spread(_) => (0.5 * value).exp(),
             _ => value.exp(),
         }
     }
@@ -160,7 +177,7 @@ pub(super) fn look(
                 (mean_power(&series, 4) / mean_power(&series, 2).powi(2)).ln()
             }
             Discrepancy::Bursts(output) => correlation(&squared(&series(output))).ln(),
-            Discrepancy::Error(reach, _) => {
+            Discrepancy::Error { reach, .. } => {
                 let (mut sum, mut count) = (0.0, 0);
                 for ((predictor, record), own) in
                     predictors.iter().zip(records).zip(problem.records.iter())

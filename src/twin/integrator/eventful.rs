@@ -2,7 +2,7 @@
 
 use super::path::{Path, Stretch, jumps};
 use super::schedule::{WayRules, limited};
-use super::watch::{EventCalls, EventWatch, EventsOfWay, MOST};
+use super::watch::{EventCalls, EventWatch, EventsOfWay};
 use super::{Integrator, Now, Workspace};
 use crate::setting::number;
 
@@ -132,11 +132,11 @@ impl EventMemory {
     fn end(&mut self, events: &EventsOfWay<'_>, way: &Now<'_>, watches: &[EventWatch]) {
         let end = way.t + way.dt;
         self.before = Some((end, watches[0].truths()));
-        if let Some(event) = watches.iter().find_map(EventWatch::fault) {
+        if let Some((event, fired)) = watches.iter().find_map(EventWatch::fault) {
             self.fault = Some(format!(
-                "{} fired more than {} times in the {} s after t = {} s; give it a condition or a change that ends, such as a least speed",
+                "{} has no end: {} events in the {} s after t = {} s; give it a condition or a change that ends, such as a least speed",
                 events.calls.list[event].name(),
-                MOST,
+                fired,
                 number(way.dt),
                 number(way.t)
             ));

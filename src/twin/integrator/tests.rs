@@ -2,7 +2,9 @@ use super::pair::ExplicitPair;
 use super::path::Stretch;
 use super::rosenbrock::Rosenbrock;
 use super::*;
-use crate::twin::Interval;
+use crate::record::Drive;
+use crate::twin::{DigitalTwin, Event, Interval, Noise, Outline, Parameter, StateSpace};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Global error of ẋ = −x + t at t = 1, whose solution is 2e^{−t} + t − 1.
 fn error(steps: usize, mut step: impl FnMut(&Now<'_>, &mut [f64])) -> f64 {
@@ -305,4 +307,49 @@ fn amounts_are_added_at_their_rows() {
         assert!((x[0] - decayed).abs() < 1e-6, "{rule:?}: {x:?}");
         assert!((x[1] - 0.4).abs() < 1e-12, "{rule:?}: {x:?}");
     }
+}
+
+/// A fall through so many thresholds, which counts its rates.
+struct Thresholds {
+    number: u32,
+    rates: AtomicUsize,
+}
+
+impl StateSpace for Thresholds {
+    fn outline(&self) -> Outline {
+        let outline = Outline::new().parameter(Parameter::new("g", "m/s²", 9.0, 11.0));
+        let outline = outline.state("h", "m").state("v", "m/s").output("y", "m");
+        (0..self.number).fold(outline, |outline, i| {
+            let height = 0.5 + f64::from(i) / 1000.0;
+            let slow = |_: &Now<'_>, x: &mut [f64]| x[1] *= 0.999;
+            outline.event(Event::when("threshold", move |_, x| height - x[0], slow))
+        })
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        self.rates.fetch_add(1, Ordering::Relaxed);
+        (dx[0], dx[1]) = (x[1], -now.theta[0]);
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y[0] = x[0];
+    }
+    fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+        x[0] = 1.0;
+    }
+    fn integrator(&self) -> Integrator {
+        Integrator::Adaptive
+    }
+}
+
+/// What events of one interval cost grows with their number: only those that come first are located.
+#[test]
+fn many_events_cost_in_proportion() {
+    let rates = |number: u32| {
+        let rates = AtomicUsize::new(0);
+        let twin = Thresholds { number, rates };
+        let drive = Drive::autonomous(1.0, 2).unwrap();
+        twin.simulate(&[10.0], &drive, Noise::OFF).unwrap();
+        twin.rates.into_inner()
+    };
+    let [few, many] = [20, 80].map(rates);
+    assert!(many < 6 * few, "{few} {many}");
 }

@@ -9,7 +9,9 @@ use super::{Integrator, Now};
 
 /// Events of a point between two samples, at most. A ball that comes to rest has infinitely many; twice as many find no more of anything
 /// that is measured, half cuts off what rattles.
-pub(super) const MOST: usize = 200;
+const MOST: usize = 200;
+/// Events of each condition at one place, at most: a change that leaves its condition where it was has no end. Half would do.
+const MOST_AT_ONCE: usize = 10;
 /// Share of a stretch to which the place of an event is found: rounding leaves no less. A hundred times as much shows in differences of
 /// likelihoods.
 const CLOSE: f64 = 1e-14;
@@ -42,6 +44,14 @@ impl EventCalls<'_> {
             margins.extend(all.map(|event| event.margin(own, &x[..self.states])));
         });
         margins
+    }
+
+    fn margin(&self, event: usize, now: &Now<'_>, x: &[f64]) -> f64 {
+        let mut margin = f64::NAN;
+        (self.inside)(now, x, &mut |own| {
+            margin = self.list[event].margin(own, &x[..self.states]);
+        });
+        margin
     }
 
     fn change(&self, event: usize, now: &Now<'_>, x: &mut [f64]) {
@@ -101,7 +111,10 @@ pub(super) struct EventWatch {
     /// Events at given times that have been.
     passed: usize,
     fired: usize,
-    last: usize,
+    /// Those of `fired` at the place of the last one.
+    at_once: usize,
+    /// The last event, and its share of the way.
+    last: (usize, f64),
 }
 
 impl EventWatch {
@@ -122,7 +135,8 @@ impl EventWatch {
             conditions: margins.iter().enumerate().map(condition).collect(),
             passed: 0,
             fired: 0,
-            last: 0,
+            at_once: 0,
+            last: (0, 0.0),
         };
         if watch.conditions.contains(&WatchState::Pending) {
             watch.jumped(events, path, 0.0, x);
@@ -137,9 +151,11 @@ impl EventWatch {
             .collect()
     }
 
-    /// Returns the event that fired too often.
-    pub fn fault(&self) -> Option<usize> {
-        (self.fired > MOST).then_some(self.last)
+    /// Returns the event that has no end, and the number of events until then.
+    pub fn fault(&self) -> Option<(usize, usize)> {
+        let most = MOST_AT_ONCE * self.conditions.len();
+        let is_endless = self.fired > MOST || self.at_once > most;
+        is_endless.then_some((self.last.0, self.fired))
     }
 
     /// Fires what a jump of the states turned true.
@@ -214,8 +230,13 @@ impl EventWatch {
         while next < waiting.len() && self.fault().is_none() {
             let event = waiting[next];
             next += 1;
-            (self.last, fired[event]) = (event, true);
+            fired[event] = true;
             self.fired += 1;
+            self.at_once = match (share - self.last.1).abs() <= SAME {
+                true => self.at_once + 1,
+                false => 1,
+            };
+            self.last = (event, share);
             let after = path.at(share, |now| {
                 events.calls.change(event, now, x);
                 events.calls.margins(now, x)
@@ -248,32 +269,33 @@ impl EventWatch {
         (from, to): (&[f64], &mut [f64]),
     ) -> Stretch {
         let end = of.from + of.length;
-        let margins = path.at(end, |now| events.calls.margins(now, to));
-        let turned = self.turned(events, path, (end, &margins), to);
-        let mut first = f64::INFINITY;
-        let mut at_first = vec![];
-        for event in turned {
+        let begin = path.at(of.from, |now| events.calls.margins(now, from));
+        let mut margins = path.at(end, |now| events.calls.margins(now, to));
+        let mut waiting = self.turned(events, path, (end, &margins), to);
+        let (mut before, mut first, mut at_first) = (of, 1.0, vec![]);
+        // An event is located only if it is true where the first one so far is.
+        while let Some(event) = take_soonest(&mut waiting, &begin, &margins) {
             let is_pending = self.conditions[event] == WatchState::Pending;
-            let margin = (event, margins[event], is_pending);
-            let share = located(events, (path, step), (of, from), margin);
-            if share < first {
-                (first, at_first) = (share, vec![event]);
-            } else if share == first {
+            let found = (event, first, margins[event], is_pending);
+            let share = located(events, (path, step), (of, from), found);
+            if first - share <= CLOSE {
                 at_first.push(event);
+                continue;
             }
+            (first, at_first) = (share, vec![event]);
+            before.length = first * of.length;
+            to.copy_from_slice(from);
+            step(path, before, to);
+            let share = before.from + before.length;
+            margins = path.at(share, |now| events.calls.margins(now, to));
+            waiting = self.turned(events, path, (share, &margins), to);
+            waiting.retain(|other| *other != event);
         }
         if at_first.is_empty() {
             self.keep_false(&margins);
             return of;
         }
-        let before = Stretch {
-            length: first * of.length,
-            ..of
-        };
-        if first < 1.0 {
-            to.copy_from_slice(from);
-            step(path, before, to);
-        }
+        at_first.sort_unstable();
         self.fire(events, path, (before.from + before.length, at_first), to);
         before
     }
@@ -327,27 +349,36 @@ fn grows(
     for (moved, x) in moved.iter_mut().zip(x) {
         *moved = x + seconds * *moved;
     }
-    let here = path.at(share, |now| events.calls.margins(now, x)[event]);
-    let there = path.at(share + PROBE, |now| {
-        events.calls.margins(now, &moved)[event]
-    });
+    let here = path.at(share, |now| events.calls.margin(event, now, x));
+    let there = path.at(share + PROBE, |now| events.calls.margin(event, now, &moved));
     there >= here
 }
 
-/// Returns the share of a stretch at which a condition becomes true, on the side where it is, a pending one also where it begins to grow; `margin`
-/// is that at the end. Secants by the rule of Illinois, every third step a half.
+/// Takes out the event whose condition, on a line from its margin at the begin to that at the end, becomes true first.
+fn take_soonest(waiting: &mut Vec<usize>, begin: &[f64], end: &[f64]) -> Option<usize> {
+    let share = |event: usize| {
+        let begin = begin[event].min(0.0);
+        begin / (begin - end[event])
+    };
+    let all = waiting.iter().enumerate();
+    let (soonest, _) = all.min_by(|a, b| share(*a.1).total_cmp(&share(*b.1)))?;
+    Some(waiting.remove(soonest))
+}
+
+/// Returns the share of a stretch at which a condition becomes true, on the side where it is, a pending one also where it begins to grow; it is
+/// true, with `margin`, at the share `end`. Secants by the rule of Illinois, every third step a half.
 fn located(
     events: &EventsOfWay<'_>,
     (path, step): (&mut Path<'_, '_>, &mut StepBy<'_>),
     (of, from): (Stretch, &[f64]),
-    (event, margin, is_pending): (usize, f64, bool),
+    (event, end, margin, is_pending): (usize, f64, f64, bool),
 ) -> f64 {
     let margin_at = |path: &mut Path<'_, '_>, share: f64, x: &[f64]| {
-        let margin = path.at(share, |now| events.calls.margins(now, x)[event]);
+        let margin = path.at(share, |now| events.calls.margin(event, now, x));
         let leaves = is_pending && margin > 0.0 && !grows(events, path, (share, event), x);
         if leaves { -margin } else { margin }
     };
-    let (mut low, mut high) = (0.0, 1.0);
+    let (mut low, mut high) = (0.0, end);
     let mut ends = [margin_at(path, of.from, from).min(0.0), margin];
     let mut x = from.to_vec();
     let mut last_is_true = None;
