@@ -87,6 +87,19 @@ impl SettingError {
     }
 }
 
+/// Returns the unit as it stands in a column of its own; a dash or a one is none.
+pub(crate) fn own_unit(unit: &str) -> &str {
+    if matches!(unit, "-" | "1") { "" } else { unit }
+}
+
+/// Returns " V", or nothing where a quantity has no unit.
+pub(crate) fn unit_suffix(unit: &str) -> String {
+    match own_unit(unit) {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    }
+}
+
 /// Returns ` (did you mean "…"?)` with the known name nearest to `given`; nothing where none is near.
 pub(crate) fn did_you_mean<'a>(
     given: &str,

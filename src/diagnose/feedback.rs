@@ -24,14 +24,6 @@ use crate::record::Record;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Rows of the input's own past. A smooth input that is not read far enough back leaves what the outputs remember of it: with a quarter, they
-/// told 25 of 60 sums of sines, with half, none. Twice asks for longer records.
-const OWN: usize = 32;
-/// Own rows are at most this part of a record.
-const SHARE: usize = 8;
-/// Rows of outputs before: twice hardly shows more of a state that a few rows tell; half misses a controller's derivative.
-const BEFORE: usize = 4;
-
 /// Inputs that react to an output of the same row.
 pub(super) fn reacting(filtered: &[Filtered], records: &[Record]) -> Vec<usize> {
     let outputs = records[0].outputs().ncols();
@@ -43,8 +35,9 @@ pub(super) fn reacting(filtered: &[Filtered], records: &[Record]) -> Vec<usize> 
 
 /// Returns whether input `i` reacts to output `j`.
 fn responds(filtered: &[Filtered], records: &[Record], i: usize, j: usize) -> bool {
-    let samples = records.iter().map(Record::samples).min();
-    let own = samples.map_or(BEFORE, |n| (n / SHARE).clamp(BEFORE, OWN));
+    let before = THRESHOLDS.feedback_before;
+    let shortest = records.iter().map(Record::samples).min().unwrap_or(0);
+    let own = (shortest / THRESHOLDS.feedback_part).clamp(before, THRESHOLDS.feedback_own);
     let (mut rows, mut inputs) = (vec![], vec![]);
     for (filtered, record) in filtered.iter().zip(records) {
         let u = record.drive().inputs().column(i);
@@ -52,16 +45,16 @@ fn responds(filtered: &[Filtered], records: &[Record], i: usize, j: usize) -> bo
         let e = filtered.innovations.column(j);
         for k in own..record.samples() {
             // A missing value has no innovation.
-            if (0..=BEFORE).all(|m| y[k - m].is_finite()) {
+            if (0..=before).all(|m| y[k - m].is_finite()) {
                 rows.push(1.0);
                 rows.extend((1..=own).map(|l| u[k - l]));
                 rows.push(e[k]);
-                rows.extend((1..=BEFORE).map(|m| y[k - m]));
+                rows.extend((1..=before).map(|m| y[k - m]));
                 inputs.push(u[k]);
             }
         }
     }
-    let all = 1 + own + 1 + BEFORE;
+    let all = 1 + own + 1 + before;
     let mut x = DMatrix::from_row_iterator(inputs.len(), all, rows);
     let mut u = DVector::from_vec(inputs);
     for _ in 0..THRESHOLDS.feedback_rounds {
@@ -76,7 +69,7 @@ fn responds(filtered: &[Filtered], records: &[Record], i: usize, j: usize) -> bo
         let least = THRESHOLDS.feedback_rest.powi(2) * u.norm_squared();
         Some(rest.iter().map(|r| r * r).sum::<f64>().max(least))
     };
-    let [Some(alone), Some(noise), Some(before)] = [1 + own, 2 + own, all].map(square) else {
+    let [Some(alone), Some(noise), Some(past)] = [1 + own, 2 + own, all].map(square) else {
         return false;
     };
     let is_clear = |without: f64, with: f64, freedom: usize| {
@@ -84,7 +77,7 @@ fn responds(filtered: &[Filtered], records: &[Record], i: usize, j: usize) -> bo
             .map(|chi| chi.inverse_cdf(1.0 - THRESHOLDS.feedback_level));
         limit.is_ok_and(|limit| u.len() as f64 * (without / with).ln() > limit)
     };
-    is_clear(alone, noise, 1) && is_clear(noise, before, BEFORE)
+    is_clear(alone, noise, 1) && is_clear(noise, past, before)
 }
 
 /// Rest that a linear regression leaves; `None` where there are too few rows.

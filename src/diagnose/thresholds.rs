@@ -16,6 +16,13 @@ numbers! {
         function_points: usize = 33,
         /// Share of draws of a function below which a term of its law is not told.
         rare_term: f64 = 0.1,
+        /// Rows of an input's own past in the test for feedback. A smooth input that is not read far enough back leaves what outputs remember of it: with
+        /// a quarter, they told 25 of 60 sums of sines, with half none. Twice asks for longer records.
+        feedback_own: usize = 32,
+        /// Part of a record that the own past is at most: an eighth. Half asks less of short records, twice leaves few rows to them.
+        feedback_part: usize = 8,
+        /// Rows of outputs before: twice hardly shows more of a state that a few rows tell; half misses a controller's derivative.
+        feedback_before: usize = 4,
         /// Level of both tests for feedback: chance takes one open loop in 10⁴ for a closed one, of inputs that also hold the noise by chance.
         feedback_level: f64 = 1e-4,
         /// Size over the median one from which a rest of an input is a jump: of normal rests one in 10⁶ is. Half cuts normal ones off, twice

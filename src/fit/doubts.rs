@@ -6,8 +6,8 @@ use super::problem::Problem;
 use crate::likelihood::StartElsewhere;
 use crate::math::{is_constant, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
-use crate::setting::number;
-use crate::twin::conformance::coarse_step;
+use crate::setting::{number, unit_suffix};
+use crate::twin::conformance::{StepLength, step_length};
 use crate::twin::{Hold, Side, Stepping, Twin};
 use std::collections::BTreeMap;
 
@@ -115,10 +115,12 @@ impl Warning {
 
     /// A step that moves outputs by more than their noise; `of` names the record.
     pub(crate) fn step(twin: &Twin, theta: &[f64], record: &Record, of: &str) -> Option<Self> {
-        let coarse = coarse_step(twin, theta, record.drive())?.ok()??;
+        let StepLength::Coarse(fault) = step_length(twin, theta, record.drive())? else {
+            return None;
+        };
         Some(Self::new(
             "step-matters",
-            format!("the step{of} is {coarse}"),
+            format!("the step{of} is {fault}"),
         ))
     }
 
@@ -155,10 +157,7 @@ impl Warning {
             1 => "the record".to_owned(),
             _ => format!("record {}", start.record + 1),
         };
-        let unit = match output.unit.as_str() {
-            "" | "-" | "1" => String::new(),
-            unit => format!(" {unit}"),
-        };
+        let unit = unit_suffix(&output.unit);
         let [value, expected] = [start.value, start.expected].map(|v| number(three_digits(v)));
         let what = format!(
             "{which} begins at {} = {value}{unit}, the start of {} is {expected}{unit} there: it is taken as unknown",

@@ -1,6 +1,7 @@
 //! Numbers for people: as many as there is room for, with the digits that they are worth.
 
 use crate::record::Quantity;
+use crate::setting::{own_unit, unit_suffix};
 
 numbers! {
     /// Limits of a page, a picture and the terminal, and of what a sentence is sure of. The JSON has everything.
@@ -172,19 +173,6 @@ pub(super) fn in_unit(unit: &str) -> String {
         "" => String::new(),
         unit => format!(" in {unit}"),
     }
-}
-
-/// " V", or nothing where a quantity has no unit.
-pub(super) fn unit_suffix(unit: &str) -> String {
-    match own_unit(unit) {
-        "" => String::new(),
-        unit => format!(" {unit}"),
-    }
-}
-
-/// The unit for a column of its own; a dash is none.
-pub(super) fn own_unit(unit: &str) -> &str {
-    if unit == "-" { "" } else { unit }
 }
 
 /// The power of ten of the leading digit; 0 for zero.

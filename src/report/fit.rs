@@ -1,7 +1,7 @@
 //! A fit as JSON and as a document.
 
 use super::chart::{Line, Panel, Style, TimeMark, chart, pair_plot};
-use super::digits::{SHOWN, in_unit, own_unit, percent, short, unit_suffix, with_error, with_unit};
+use super::digits::{SHOWN, in_unit, percent, short, with_error, with_unit};
 use super::document::Column::{Number, Text};
 use super::document::{Block, Document, Picture, Section};
 use super::parameters::{ParameterRow, priors, values};
@@ -9,6 +9,7 @@ use super::record::overlay_svg;
 use super::residuals::{Left, residual_blocks};
 use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Profile, depth};
 use crate::record::Record;
+use crate::setting::{own_unit, unit_suffix};
 use crate::study::Study;
 use crate::twin::{Parameter, ParameterSpace};
 use serde_json::{Value, json};
@@ -186,7 +187,7 @@ fn headline(fit: &Fit) -> String {
         None => format!("{fitted}: the free run diverges."),
         Some(off) if off >= 1.0 => format!("{fitted}: the free run does not follow the record."),
         Some(off) => format!(
-            "{fitted}: the free run follows the record, error {} of its deviation.",
+            "{fitted}: the error of the free run is {} of the record's deviation.",
             percent(off)
         ),
     }

@@ -6,6 +6,7 @@ use super::document::Column::{Number, Text};
 use crate::diagnose::FittedParameter;
 use crate::math::three_digits;
 use crate::setting::number;
+use crate::setting::own_unit;
 use crate::twin::{Interval, PRIOR_DEVIATION, Parameter, Role, Side};
 use serde::Serialize;
 
@@ -145,7 +146,7 @@ pub(super) fn values(caption: &str, level: f64, rows: &[ParameterRow]) -> Block 
                 true => "–".to_owned(),
                 false => format!("[{low}, {high}]"),
             },
-            digits::own_unit(&row.unit).to_owned(),
+            own_unit(&row.unit).to_owned(),
             row.remark(),
         ]
     };

@@ -10,7 +10,6 @@
 //! | find out what is wrong with a new twin | [`conformance`] |
 
 mod adapt;
-mod beside;
 mod blocks;
 mod composed;
 pub mod conformance;

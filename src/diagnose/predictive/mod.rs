@@ -61,7 +61,7 @@ impl Predictive<'_> {
         if problem.is_simulated() || self.draws.thetas.is_empty() {
             return Ok(None);
         }
-        let statistics = Discrepancy::all(problem, self.correlated().is_empty(), self.is_open_loop);
+        let statistics = Discrepancy::all(problem);
         let measured = self.measured(&statistics)?;
         let mut simulated: Vec<Look> = vec![];
         let mut compared = None;
@@ -69,7 +69,7 @@ impl Predictive<'_> {
             let draw = |i: usize| &self.draws.thetas[i % self.draws.thetas.len()];
             let all = self.replicates(simulated.len()..count, draw)?;
             simulated.extend(looks(problem, &all, &statistics)?);
-            compared = Some(compare(&statistics, &measured, &simulated));
+            compared = Some(self.compare(&statistics, &measured, &simulated));
             let is_clear = |check: &PredictiveCheck| {
                 check.p_value * (simulated.len() + 1) as f64 > THRESHOLDS.check_enough
             };
@@ -131,6 +131,58 @@ impl Predictive<'_> {
             .collect::<Option<Vec<_>>>();
         Ok(records.map(|records| Replicate { theta, records }))
     }
+
+    /// Compares statistics of the measured records with those of simulated ones.
+    fn compare(
+        &self,
+        statistics: &[Discrepancy],
+        measured: &Look,
+        simulated: &[Look],
+    ) -> PredictiveCheck {
+        // A value that is not finite is of a statistic that has no meaning here (readings that never move).
+        let usable: Vec<usize> = (0..statistics.len())
+            .filter(|&s| {
+                measured[s].is_finite() && simulated.iter().all(|look| look[s].is_finite())
+            })
+            .collect();
+        let columns: Vec<(usize, f64, f64)> = (usable.into_iter())
+            .filter_map(|s| {
+                let values: Vec<f64> = simulated.iter().map(|look| look[s]).collect();
+                let spread = deviation(&values);
+                (spread > 0.0 && spread.is_finite()).then(|| (s, mean(&values), spread))
+            })
+            .collect();
+        let (is_white, is_open_loop) = (self.correlated().is_empty(), self.is_open_loop);
+        let departed = |s: usize, z: f64| statistics[s].departure(z, is_white, is_open_loop);
+        let largest = |look: &Look| {
+            let departure =
+                |(s, mean, spread): &(usize, f64, f64)| departed(*s, (look[*s] - mean) / spread);
+            columns.iter().map(departure).fold(0.0, f64::max)
+        };
+        let own = largest(measured);
+        let above = simulated.iter().filter(|look| largest(look) >= own).count();
+        let rows = (columns.iter())
+            .map(|&(s, mean, spread)| {
+                let values: Vec<f64> = simulated.iter().map(|look| look[s]).collect();
+                let end =
+                    |p: f64| quantile(&values, p).map_or(f64::NAN, |v| statistics[s].shown(v));
+                Predicted {
+                    statistic: statistics[s].id(),
+                    measured: statistics[s].shown(measured[s]),
+                    expected: [end(0.05), end(0.95)],
+                    deviations: (measured[s] - mean) / spread,
+                    departure: departed(s, (measured[s] - mean) / spread),
+                }
+            })
+            .collect();
+        PredictiveCheck {
+            p_value: (above + 1) as f64 / (simulated.len() + 1) as f64,
+            simulations: simulated.len(),
+            rows,
+            noise_share: None,
+            disturbance: None,
+        }
+    }
 }
 
 /// The statistics of each; those whose filter or run fails are left out.
@@ -144,47 +196,4 @@ fn looks(
             statistics::look(problem, &one.records, &one.theta, statistics).transpose()
         })
         .collect()
-}
-
-/// Compares statistics of the measured records with those of simulated ones.
-fn compare(statistics: &[Discrepancy], measured: &Look, simulated: &[Look]) -> PredictiveCheck {
-    // A value that is not finite is of a statistic that has no meaning here (readings that never move).
-    let usable: Vec<usize> = (0..statistics.len())
-        .filter(|&s| measured[s].is_finite() && simulated.iter().all(|look| look[s].is_finite()))
-        .collect();
-    let columns: Vec<(usize, f64, f64)> = (usable.into_iter())
-        .filter_map(|s| {
-            let values: Vec<f64> = simulated.iter().map(|look| look[s]).collect();
-            let spread = deviation(&values);
-            (spread > 0.0 && spread.is_finite()).then(|| (s, mean(&values), spread))
-        })
-        .collect();
-    let largest = |look: &Look| {
-        let departure = |(s, mean, spread): &(usize, f64, f64)| {
-            statistics[*s].departure((look[*s] - mean) / spread)
-        };
-        columns.iter().map(departure).fold(0.0, f64::max)
-    };
-    let own = largest(measured);
-    let above = simulated.iter().filter(|look| largest(look) >= own).count();
-    let rows = (columns.iter())
-        .map(|&(s, mean, spread)| {
-            let values: Vec<f64> = simulated.iter().map(|look| look[s]).collect();
-            let end = |p: f64| quantile(&values, p).map_or(f64::NAN, |v| statistics[s].shown(v));
-            Predicted {
-                statistic: statistics[s].id(),
-                measured: statistics[s].shown(measured[s]),
-                expected: [end(0.05), end(0.95)],
-                deviations: (measured[s] - mean) / spread,
-                departure: statistics[s].departure((measured[s] - mean) / spread),
-            }
-        })
-        .collect();
-    PredictiveCheck {
-        p_value: (above + 1) as f64 / (simulated.len() + 1) as f64,
-        simulations: simulated.len(),
-        rows,
-        noise_share: None,
-        disturbance: None,
-    }
 }

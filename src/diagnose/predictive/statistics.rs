@@ -21,37 +21,27 @@ use crate::study::StudyError;
 pub(super) enum Discrepancy {
     Spread(String),
     /// It counts where the fit claims that all noise is white: of correlated noise a fit knows a few correlations alone.
-    Whiteness {
-        output: String,
-        counts: bool,
-    },
+    Whiteness(String),
     Tails(String),
     Bursts(String),
     /// It counts where no input reacts: a simulated record has the inputs of the measured one, without a controller that answers it, and may
     /// go where the loop does not let the system go.
-    Error {
-        reach: Reach,
-        dt: f64,
-        counts: bool,
-    },
+    Error(Reach, f64),
 }
 
 /// Values of all statistics; NaN where one has no meaning.
 pub(super) type Look = Vec<f64>;
 
 impl Discrepancy {
-    /// All that are looked at; `is_white` where the fit knows no correlated noise, `is_open` where no input reacts to an output.
-    pub fn all(problem: &Problem, is_white: bool, is_open: bool) -> Vec<Self> {
+    /// All that are looked at.
+    pub fn all(problem: &Problem) -> Vec<Self> {
         let outputs = problem.outline().outputs.into_iter();
         let mut all: Vec<Self> = outputs
             .flat_map(|output| {
                 let name = output.name;
                 [
                     Self::Spread(name.clone()),
-                    Self::Whiteness {
-                        output: name.clone(),
-                        counts: is_white,
-                    },
+                    Self::Whiteness(name.clone()),
                     Self::Tails(name.clone()),
                     Self::Bursts(name),
                 ]
@@ -62,54 +52,45 @@ impl Discrepancy {
         let further = reaches(problem, HeldOutRows { record, from: 0 })
             .into_iter()
             .skip(1);
-        all.extend(further.map(|reach| Self::Error {
-            reach,
-            dt: record.drive().dt(),
-            counts: is_open,
-        }));
+        all.extend(further.map(|reach| Self::Error(reach, record.drive().dt())));
         all
     }
 
     /// Departure from simulated records that counts, from the distance to their mean in standard deviations: what is less correlated than
     /// noise is no gap, and neither are tails. Independent noise may have any; what comes in bursts or moves predictions shows elsewhere.
-    pub fn departure(&self, deviations: f64) -> f64 {
+    pub fn departure(&self, deviations: f64, is_white: bool, is_open_loop: bool) -> f64 {
         match self {
-            Self::Whiteness { counts: false, .. }
-            | Self::Error { counts: false, .. }
-            | Self::Tails(_) => 0.0,
-            Self::Spread(_) | Self::Error { .. } => deviations.abs(),
-            Self::Whiteness { .. } | Self::Bursts(_) => deviations.max(0.0),
+            Self::Tails(_) => 0.0,
+            Self::Whiteness(_) if !is_white => 0.0,
+            Self::Error(..) if !is_open_loop => 0.0,
+            Self::Spread(_) | Self::Error(..) => deviations.abs(),
+            Self::Whiteness(_) | Self::Bursts(_) => deviations.max(0.0),
         }
     }
 
     /// Returns whether it is the error of windows, and no free run's.
     pub fn is_window(&self) -> bool {
-        let Self::Error { reach, .. } = self else {
-            return false;
-        };
-        matches!(reach, Reach::Samples(_))
+        matches!(self, Self::Error(Reach::Samples(_), _))
     }
 
     /// Name in reports.
     pub fn id(&self) -> String {
         match self {
             Self::Spread(output) => format!("spread of {output}"),
-            Self::Whiteness { output, .. } => format!("whiteness of {output}"),
+            Self::Whiteness(output) => format!("whiteness of {output}"),
             Self::Tails(output) => format!("tails of {output}"),
             Self::Bursts(output) => format!("bursts of {output}"),
-            Self::Error { reach, dt, .. } => match reach {
-                Reach::FreeRun => "error of the free run".into(),
-                Reach::Samples(h) => {
-                    format!("error {} s ahead", crate::math::six_digits(*h as f64 * dt))
-                }
-            },
+            Self::Error(Reach::FreeRun, _) => "error of the free run".into(),
+            Self::Error(Reach::Samples(h), dt) => {
+                format!("error {} s ahead", crate::math::six_digits(*h as f64 * dt))
+            }
         }
     }
 
     /// The value as it is reported: errors as root mean squares, all else as it is in the table above without its logarithm.
     pub fn shown(&self, value: f64) -> f64 {
         match self {
-            Self::Error { .. } | Self::Spread(_) => (0.5 * value).exp(),
+            Self::Error(..) | Self::Spread(_) => (0.5 * value).exp(),
             _ => value.exp(),
         }
     }
@@ -171,13 +152,13 @@ pub(super) fn look(
     let value = |statistic: &Discrepancy| -> Result<f64, StudyError> {
         Ok(match statistic {
             Discrepancy::Spread(output) => mean_power(&series(output), 2).ln(),
-            Discrepancy::Whiteness { output, .. } => correlation(&series(output)).ln(),
+            Discrepancy::Whiteness(output) => correlation(&series(output)).ln(),
             Discrepancy::Tails(output) => {
                 let series = series(output);
                 (mean_power(&series, 4) / mean_power(&series, 2).powi(2)).ln()
             }
             Discrepancy::Bursts(output) => correlation(&squared(&series(output))).ln(),
-            Discrepancy::Error { reach, .. } => {
+            Discrepancy::Error(reach, _) => {
                 let (mut sum, mut count) = (0.0, 0);
                 for ((predictor, record), own) in
                     predictors.iter().zip(records).zip(problem.records.iter())

@@ -4,7 +4,7 @@ mod together;
 
 pub(crate) use together::{together_document, together_json};
 
-use super::digits::{SHOWN, probability, short, unit_suffix};
+use super::digits::{SHOWN, probability, short};
 use super::document::{Block, Document, Picture, Section};
 use super::fit::draws;
 use super::parameters::{ParameterRow, priors, values};
@@ -14,7 +14,7 @@ use crate::estimator::{Estimate, GateOutcome, INTERVAL_LEVEL};
 use crate::math::three_digits;
 use crate::record::Record;
 use crate::report::fit::posterior_json;
-use crate::setting::number;
+use crate::setting::{number, unit_suffix};
 use crate::study::Study;
 use crate::twin::Role;
 use serde_json::{Value, json};

@@ -27,8 +27,9 @@ use super::parameters::{ParameterRow, priors, values};
 use super::residuals::{Left, residual_blocks};
 use super::units::Units;
 use crate::diagnose::{Diagnosis, THRESHOLDS, Verdict};
-use crate::report::digits::{own_unit, with_error};
+use crate::report::digits::with_error;
 use crate::report::document::Column::{Number, Text};
+use crate::setting::own_unit;
 use crate::study::Study;
 use serde_json::Value;
 

@@ -4,9 +4,10 @@ use super::statement::{accepted_ids, accepted_places, places};
 use super::words::{few, joined};
 use super::{check, pictures};
 use crate::diagnose::{Diagnosis, Maps, Verdict};
-use crate::report::digits::{SHOWN, chance, short, unit_suffix};
+use crate::report::digits::{SHOWN, chance, short};
 use crate::report::document::{Block, Section};
 use crate::report::units::Units;
+use crate::setting::unit_suffix;
 use crate::study::Study;
 
 pub(super) fn section(study: &Study, diagnosis: &Diagnosis) -> Section {

@@ -17,7 +17,7 @@ mod step;
 mod tests;
 
 pub(crate) use points::check_points;
-pub(crate) use step::{blamed_step, check_step, coarse_step};
+pub(crate) use step::{StepLength, blamed_step, check_step, step_length};
 
 use crate::math::{six_digits, thin_svd};
 use crate::record::{Drive, Signal, check_sizes};

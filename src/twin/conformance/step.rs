@@ -3,6 +3,7 @@
 use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
 use crate::record::{Drive, Signal};
+use crate::setting::unit_suffix;
 use crate::twin::{Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, Twin};
 
 /// Largest error of the step where no noise is declared, as a share of an output's deviation.
@@ -34,13 +35,13 @@ pub(crate) fn step_error(
 
 /// Compares the [`step_error`] at θ with the measurement noise of each output; `None` for a black box.
 pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Finding> {
-    let outcome: Outcome = match coarse_step(twin, theta, drive)? {
-        Ok(Some(coarse)) => warned(coarse),
-        Ok(None) => Ok(match twin.steps_taken(theta, drive) {
+    let outcome: Outcome = match step_length(twin, theta, drive)? {
+        StepLength::Coarse(fault) => warned(fault),
+        StepLength::Fine => Ok(match twin.steps_taken(theta, drive) {
             Some(taken) => taken.text(),
             None => "half the step moves no output by more than its noise".into(),
         }),
-        Err(error) => warned(format!("not known: {error}")),
+        StepLength::Unknown(error) => warned(format!("not known: {error}")),
     };
     Some(Finding::of("step", outcome))
 }
@@ -58,12 +59,18 @@ pub(crate) fn blamed_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<&
     )
 }
 
-/// Outputs that half of the step moves by more than their noise, with the remedy; `None` for a black box.
-pub(crate) fn coarse_step(
-    twin: &Twin,
-    theta: &[f64],
-    drive: &Drive,
-) -> Option<Result<Option<String>, SimulationError>> {
+/// Outcome of a comparison of a step with half of it.
+pub(crate) enum StepLength {
+    /// It moves no output by more than its noise.
+    Fine,
+    /// The step is too long: the outputs that half of it moves, with the remedy.
+    Coarse(String),
+    /// A run failed.
+    Unknown(SimulationError),
+}
+
+/// Compares runs with the step and half of it; `None` for a black box and in discrete time.
+pub(crate) fn step_length(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<StepLength> {
     let equations = (twin.equations()).filter(|own| own.integrator() != Integrator::Discrete)?;
     let known = step_error(twin, theta, drive)
         .and_then(|errors| Ok((errors, step_levels(equations, theta, drive)?)));
@@ -71,7 +78,9 @@ pub(crate) fn coarse_step(
         Ok(known) => known,
         Err(error) => {
             let blamed = blamed_step(twin, theta, drive);
-            return Some(blamed.map_or(Err(error), |blamed| Ok(Some(blamed.into()))));
+            return Some(blamed.map_or(StepLength::Unknown(error), |fault| {
+                StepLength::Coarse(fault.into())
+            }));
         }
     };
     let units = twin.signals().outputs.into_iter().map(|output| output.unit);
@@ -79,33 +88,29 @@ pub(crate) fn coarse_step(
         .filter(|((error, (level, _)), _)| error.1 > *level)
         .map(|(((name, error), (level, source)), unit)| {
             let (error, level) = (three_digits(*error), three_digits(*level));
-            let unit = if unit.is_empty() {
-                unit
-            } else {
-                format!(" {unit}")
-            };
+            let unit = unit_suffix(&unit);
             format!("{name} moves by {error}{unit} rms, {source} is {level}{unit}")
         })
         .collect();
     if coarse.is_empty() {
-        return Some(Ok(None));
+        return Some(StepLength::Fine);
     }
     if equations.workspace().steps_taken().is_some() {
         let tolerance = equations.stepping().tolerance * FINER;
-        return Some(Ok(Some(format!(
+        return Some(StepLength::Coarse(format!(
             "too long: with finer ones, {}; give the study tolerance = {tolerance:e}",
             coarse.join("; ")
-        ))));
+        )));
     }
     let substeps = (4 * equations.stepping().substeps).min(MOST_SUBSTEPS);
     let finer = match equations.integrator() {
         Integrator::Euler => "runge-kutta-4",
         _ => "adaptive",
     };
-    Some(Ok(Some(format!(
+    Some(StepLength::Coarse(format!(
         "too long: with half the step, {}; give the study {substeps} substeps, or the integrator {finer}",
         coarse.join("; ")
-    ))))
+    )))
 }
 
 /// Limit of each output's move, and the limit's name.

@@ -46,14 +46,6 @@ impl EventCalls<'_> {
         margins
     }
 
-    fn margin(&self, event: usize, now: &Now<'_>, x: &[f64]) -> f64 {
-        let mut margin = f64::NAN;
-        (self.inside)(now, x, &mut |own| {
-            margin = self.list[event].margin(own, &x[..self.states]);
-        });
-        margin
-    }
-
     fn change(&self, event: usize, now: &Now<'_>, x: &mut [f64]) {
         let seen = x.to_vec();
         (self.inside)(now, &seen, &mut |own| {
@@ -349,8 +341,10 @@ fn grows(
     for (moved, x) in moved.iter_mut().zip(x) {
         *moved = x + seconds * *moved;
     }
-    let here = path.at(share, |now| events.calls.margin(event, now, x));
-    let there = path.at(share + PROBE, |now| events.calls.margin(event, now, &moved));
+    let here = path.at(share, |now| events.calls.margins(now, x)[event]);
+    let there = path.at(share + PROBE, |now| {
+        events.calls.margins(now, &moved)[event]
+    });
     there >= here
 }
 
@@ -374,7 +368,7 @@ fn located(
     (event, end, margin, is_pending): (usize, f64, f64, bool),
 ) -> f64 {
     let margin_at = |path: &mut Path<'_, '_>, share: f64, x: &[f64]| {
-        let margin = path.at(share, |now| events.calls.margin(event, now, x));
+        let margin = path.at(share, |now| events.calls.margins(now, x)[event]);
         let leaves = is_pending && margin > 0.0 && !grows(events, path, (share, event), x);
         if leaves { -margin } else { margin }
     };
