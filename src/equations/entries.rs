@@ -5,7 +5,7 @@ use super::lexer::is_name;
 use super::operation::Callable;
 use super::place::{PlacedExpression, SourceText, number};
 use crate::setting::did_you_mean;
-use crate::storage::untrusted::excerpt;
+use crate::storage::untrusted::{excerpt, hidden};
 use crate::twin::Interval;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -158,8 +158,8 @@ impl<'a, 't> TableEntry<'a, 't> {
         match keys.get(key) {
             None => Ok(String::new()),
             Some(value) => match value.get_ref().as_str() {
-                Some(text) => Ok(text.to_owned()),
-                None => self.wrong(key, value, "a text"),
+                Some(text) if !text.contains(hidden) => Ok(text.to_owned()),
+                _ => self.wrong(key, value, "a text of one line without hidden characters"),
             },
         }
     }

@@ -108,3 +108,72 @@ fn wrong_calls_are_refused_with_the_remedy() {
     );
     assert!(said.contains("features"), "{said}");
 }
+
+/// A checksum of the manifest that is no shard's, and parameters of another twin's range.
+#[test]
+fn banks_that_are_not_what_they_say_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    done(at, "bank --twin van-der-pol --size 40 --out bank");
+    done(at, "merge bank --out bank.csv");
+    let csv = std::fs::read_to_string(at.join("bank.csv")).unwrap();
+    let (head, rows) = csv.split_once('\n').unwrap();
+    let (_, others) = rows.split_once(',').unwrap();
+    std::fs::write(at.join("far.csv"), format!("{head}\n1e5,{others}")).unwrap();
+    let train = "pretrain --twin van-der-pol --epochs 1 --out x.est --bank";
+    let said = refused(at, &format!("{train} far.csv"));
+    assert!(said.contains("far.csv: theta, row 1: nu = "), "{said}");
+
+    let path = at.join("bank/manifest.json");
+    let mut manifest: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    for sum in manifest["checksums"].as_array_mut().unwrap() {
+        *sum = sum.as_str().unwrap().replace('1', "2").into();
+    }
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    for call in [&format!("{train} bank"), "merge bank --out again.npz"] {
+        let said = refused(at, call);
+        assert!(said.contains("bank"), "{call}: {said}");
+    }
+}
+
+/// An estimator carries its setting: a call that names another one is not answered by the estimator's.
+#[test]
+fn reproduce_refuses_an_estimator_of_another_study() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let study = |name: &str, prior: &str| {
+        let text = format!("twin = 'van-der-pol'\n[prior]\nnu = {prior}\n");
+        std::fs::write(at.join(name), text).unwrap();
+    };
+    study("one.toml", "[1.0, 2.0]");
+    study("two.toml", "[0.5, 1.5]");
+    done(
+        at,
+        "pretrain --study one.toml --bank-size 100 --epochs 1 --out e.est",
+    );
+    let call = "reproduce --scenario 0 --runs 1 --estimator e.est";
+    let said = refused(at, &format!("{call} --study two.toml"));
+    assert!(said.contains("e.est: made for another setting"), "{said}");
+    done(at, &format!("{call} --study one.toml"));
+    done(at, &format!("{call} --twin van-der-pol"));
+}
+
+#[test]
+fn texts_that_steer_a_terminal_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let twin = |name: &str, unit: &str| {
+        format!(
+            "[twin]\nname = \"{name}\"\n[parameters]\na = {{ prior = [0.5, 2.0] }}\n[states]\n\
+             x = {{ rate = \"-a*x\", start = 1.0, unit = \"{unit}\" }}\n[outputs]\ny = {{ value = \"x\", noise = 0.1 }}\n\
+             [record]\nstep = 0.1\nsamples = 20\n"
+        )
+    };
+    for (name, unit) in [("p\\u202Eq", "m"), ("p", "m\\u001b[31m")] {
+        std::fs::write(at.join("s.toml"), twin(name, unit)).unwrap();
+        let said = refused(at, "check --study s.toml");
+        assert!(said.contains("s.toml, line "), "{said}");
+        assert!(said.contains("hidden characters"), "{said}");
+    }
+}

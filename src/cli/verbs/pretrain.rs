@@ -92,7 +92,14 @@ fn bank(
     settings: &PretrainOptions,
 ) -> Result<(Box<dyn Bank>, String), Failure> {
     if file::is_named(path) {
-        let bank = file::read(path, &project.study().twin().parameters().names())?;
+        let space = project.study().twin().parameters();
+        let bank = file::read(path, &space.names())?;
+        for (row, theta) in bank.theta.rows().into_iter().enumerate() {
+            space.check_point(&theta.to_vec()).map_err(|error| {
+                let (path, row) = (path.display(), row + 1);
+                Failure::user(format!("{path}: theta, row {row}: {error}"))
+            })?;
+        }
         return Ok((Box::new(bank), checksum(path)?));
     }
     let bank = ShardedBank::open(path)?;

@@ -78,7 +78,7 @@ pub(in crate::cli) struct Reproduce {
     /// Recipe of features, network and refinement.
     #[arg(long, value_enum, default_value = "default")]
     preset: PresetArgument,
-    /// Existing estimator to score.
+    /// Existing estimator to score, in the setting that it was trained in; a study beside it must be that.
     #[arg(long, value_name = "EST", conflicts_with_all = ["preset", "bank_size", "epochs"])]
     estimator: Option<PathBuf>,
     /// Number of simulations [default: the preset's].
@@ -107,7 +107,7 @@ impl Verb for Reproduce {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let project = context.project(&self.subject)?;
         let given = (self.estimator.as_ref())
-            .map(|path| load(context, path, project.study()))
+            .map(|path| load(context, path, project.study(), self.subject.study.is_some()))
             .transpose()?;
         // An estimator carries the setting that it was made for.
         let study = (given.as_ref()).map_or(project.study(), Estimator::study);
@@ -172,8 +172,13 @@ impl Verb for Reproduce {
     }
 }
 
-/// Loads an estimator; refuses one of another twin.
-fn load(context: &Context<'_>, path: &Path, study: &Study) -> Result<Estimator, Failure> {
+/// Loads an estimator; refuses one of another twin, and of another setting where the call names one.
+fn load(
+    context: &Context<'_>,
+    path: &Path,
+    study: &Study,
+    is_set: bool,
+) -> Result<Estimator, Failure> {
     let estimator = Estimator::load(path, context.projects)?;
     let (made_for, asked) = (estimator.study().name(), study.name());
     if made_for != asked {
@@ -181,6 +186,15 @@ fn load(context: &Context<'_>, path: &Path, study: &Study) -> Result<Estimator, 
             "{}: made for twin {made_for}, the call names {asked}; name the same twin",
             path.display()
         )));
+    }
+    if is_set {
+        let [made_for, asked] = [estimator.study(), study].map(|s| s.manifest("reproduce", 0));
+        if let Some(difference) = asked?.differs(&made_for?) {
+            return Err(Failure::user(format!(
+                "{}: made for another setting: {difference}; name the study that it was trained with, or the twin alone",
+                path.display()
+            )));
+        }
     }
     Ok(estimator)
 }

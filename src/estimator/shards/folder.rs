@@ -201,6 +201,18 @@ impl Shards {
         }
         Ok(())
     }
+
+    /// Refuses a whole bank whose shards are not those of its finished manifest.
+    pub(super) fn check_finished(&self, finished: Option<&Value>) -> Result<(), EstimatorError> {
+        let there = json!(self.there.values().collect::<Vec<_>>());
+        match finished {
+            Some(sums) if self.there.len() == self.of && *sums != there => Err(damaged(
+                &self.folder.file(SHARDS),
+                "its shards are not those of manifest.json",
+            )),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Returns the error of a folder whose manifest is incomplete.
@@ -240,14 +252,10 @@ impl ShardedBank {
         let seed = seed.ok_or_else(|| foreign(path))?;
         let finished = manifest.checksums().cloned();
         let shards = Shards::list(folder, manifest)?;
-        let there = json!(shards.there.values().collect::<Vec<_>>());
         if shards.there.len() < shards.of || finished.is_none() {
             return Err(shards.incomplete());
         }
-        if finished != Some(there) {
-            let file = shards.folder.file(SHARDS);
-            return Err(damaged(&file, "its shards are not those of manifest.json"));
-        }
+        shards.check_finished(finished.as_ref())?;
         Ok(Self { shards, seed })
     }
 

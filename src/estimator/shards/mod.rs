@@ -223,7 +223,10 @@ fn listed(from: &[PathBuf]) -> Result<Vec<Shards>, EstimatorError> {
     let all = (from.iter())
         .map(|path| {
             let (folder, manifest) = WorkFolder::find(path, VERB)?;
-            Shards::list(folder, manifest.unfinished())
+            let finished = manifest.checksums().cloned();
+            let shards = Shards::list(folder, manifest.unfinished())?;
+            shards.check_finished(finished.as_ref())?;
+            Ok(shards)
         })
         .collect::<Result<Vec<Shards>, EstimatorError>>()?;
     for (other, path) in all.iter().zip(from).skip(1) {

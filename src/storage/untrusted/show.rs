@@ -7,7 +7,7 @@ const QUOTED: usize = 160;
 /// Longest message of a parser, in characters: it may list what it knows.
 const MESSAGE: usize = 2000;
 /// Words of parsers, and those of their readers.
-const WORDS: [(&str, &str); 16] = [
+const WORDS: [(&str, &str); 17] = [
     (
         "as i128, expected any valid TOML value",
         "has too many digits",
@@ -15,6 +15,7 @@ const WORDS: [(&str, &str); 16] = [
     ("invalid type: map", "found a table"),
     ("invalid type: sequence", "found a list"),
     ("invalid type: ", "found "),
+    ("expected dyn FeatureRecipe", "expected a kind of features"),
     ("expected f64", "expected a number"),
     ("expected usize", "expected a whole number"),
     ("expected u64", "expected a whole number"),

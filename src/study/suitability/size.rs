@@ -70,6 +70,7 @@ pub(super) fn check_outputs(
 ) -> (Vec<Finding>, Vec<f64>) {
     let outputs = study.twin().signals().outputs;
     let (mut findings, mut factors) = (vec![], vec![1.0; outputs.len()]);
+    let mut moves = false;
     if runs.is_empty() {
         let message = "the twin diverges under the record's inputs at every point of its prior; check units and prior";
         return (vec![Finding::warning("scale", message)], factors);
@@ -80,7 +81,8 @@ pub(super) fn check_outputs(
         let sizes: Vec<f64> = sizes.collect();
         let (low, high) = ends(&sizes);
         let beyond = |size: f64, times: f64| size > times * high || size < low / times;
-        if own == 0.0 || low == 0.0 || !beyond(own, LIMITS.doubted) {
+        moves |= own > 0.0;
+        if own == 0.0 || low == 0.0 || !high.is_finite() || !beyond(own, LIMITS.doubted) {
             continue;
         }
         let Ok(middle) = median(&sizes) else {
@@ -110,7 +112,9 @@ pub(super) fn check_outputs(
         findings.push(Finding::warning("scale", message));
         factors[j] = nearest.unwrap_or(1.0);
     }
-    let findings = or_pass(findings, "scale", "outputs vary as runs of the twin do");
+    if moves {
+        findings = or_pass(findings, "scale", "outputs vary as runs of the twin do");
+    }
     (findings, factors)
 }
 

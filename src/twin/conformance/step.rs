@@ -3,13 +3,15 @@
 use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
 use crate::record::{Drive, Signal};
-use crate::setting::unit_suffix;
+use crate::setting::{number, unit_suffix};
 use crate::twin::{Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, Twin};
 
 /// Largest error of the step where no noise is declared, as a share of an output's deviation.
 const STEP_SHARE: f64 = 0.01;
 /// Share of the tolerance of adaptive steps that stands for exact ones.
 const FINER: f64 = 0.01;
+/// Fault and remedy of a step that makes runs diverge.
+const DIVERGES: &str = "too long: the run diverges, with steps to a tolerance it does not; give the study the integrator adaptive";
 /// Runs that show what process noise does to an output without measurement noise: its scatter is known to a quarter.
 const NOISY_RUNS: u64 = 8;
 
@@ -54,9 +56,7 @@ pub(crate) fn blamed_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<&
     }
     let error = twin.free_run(theta, drive).err()?;
     let adaptive = twin.stepped(|rule, _| *rule = Integrator::Adaptive)?;
-    (error.costs_one_run() && adaptive.free_run(theta, drive).is_ok()).then_some(
-        "too long: the run diverges, with steps to a tolerance it does not; give the study the integrator adaptive",
-    )
+    (error.costs_one_run() && adaptive.free_run(theta, drive).is_ok()).then_some(DIVERGES)
 }
 
 /// Outcome of a comparison of a step with half of it.
@@ -83,11 +83,14 @@ pub(crate) fn step_length(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<S
             }));
         }
     };
+    if errors.iter().any(|(_, error)| !error.is_finite()) {
+        return Some(StepLength::Coarse(DIVERGES.into()));
+    }
     let units = twin.signals().outputs.into_iter().map(|output| output.unit);
     let coarse: Vec<String> = (errors.iter().zip(&levels).zip(units))
         .filter(|((error, (level, _)), _)| error.1 > *level)
         .map(|(((name, error), (level, source)), unit)| {
-            let (error, level) = (three_digits(*error), three_digits(*level));
+            let [error, level] = [*error, *level].map(|v| number(three_digits(v)));
             let unit = unit_suffix(&unit);
             format!("{name} moves by {error}{unit} rms, {source} is {level}{unit}")
         })

@@ -224,7 +224,7 @@ impl EventWatch {
             next += 1;
             fired[event] = true;
             self.fired += 1;
-            self.at_once = match (share - self.last.1).abs() <= SAME {
+            self.at_once = match (share - self.last.1).abs() <= CLOSE {
                 true => self.at_once + 1,
                 false => 1,
             };
