@@ -17,7 +17,7 @@ numbers! {
         /// Share of draws of a function below which a term of its law is not told.
         rare_term: f64 = 0.1,
         /// Rows of an input's own past in the test for feedback. A smooth input that is not read far enough back leaves what outputs remember of it: with
-        /// a quarter, they told 25 of 60 sums of sines, with half none. Twice asks for longer records.
+        /// half, they told 25 of 60 sums of noisy sines, with a quarter 40, and none with all. Twice asks for longer records.
         feedback_own: usize = 32,
         /// Part of a record that the own past is at most: an eighth. Half asks less of short records, twice leaves few rows to them.
         feedback_part: usize = 8,
