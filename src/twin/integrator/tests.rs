@@ -340,7 +340,7 @@ impl StateSpace for Thresholds {
     }
 }
 
-/// What events of one interval cost grows with their number: only those that come first are located.
+/// The cost of events of one interval grows with their number: only those that come first are located.
 #[test]
 fn many_events_cost_in_proportion() {
     let rates = |number: u32| {

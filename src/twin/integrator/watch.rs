@@ -348,7 +348,7 @@ fn grows(
     there >= here
 }
 
-/// Takes out the event whose condition, on a line from its margin at the begin to that at the end, becomes true first.
+/// Takes out the event whose condition, on a line from its margin at the beginning to that at the end, becomes true first.
 fn take_soonest(waiting: &mut Vec<usize>, begin: &[f64], end: &[f64]) -> Option<usize> {
     let share = |event: usize| {
         let begin = begin[event].min(0.0);

@@ -61,6 +61,18 @@ fn a_manifest_names_no_path() {
         let line = refused(place.path(), &["merge", "bank", "--out", "merged"]);
         assert!(line.contains("not those of manifest.json"), "{line}");
         assert_eq!(files(place.path()), before);
+        // Whole again, as the message says: the names of shards come from their bytes.
+        done(place.path(), &BANK);
+        done(place.path(), &["merge", "bank", "--out", "merged"]);
+        let names = |folder: &str| -> Vec<_> {
+            let all = files(&place.path().join(folder).join("shards"));
+            all.iter()
+                .map(|p| p.file_name().unwrap().to_owned())
+                .collect()
+        };
+        assert_eq!(names("merged"), names("bank"));
+        fs::remove_dir_all(place.path().join("merged")).unwrap();
+        assert_eq!(files(place.path()), before);
     }
 }
 
