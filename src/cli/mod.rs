@@ -128,6 +128,19 @@ fn in_pool<R: Send>(
 ) -> Result<R, Failure> {
     let builder = rayon::ThreadPoolBuilder::new();
     let failed = |threads, error| Failure::from(StorageError::threads(threads, error));
+    let of_environment = std::env::var("RAYON_NUM_THREADS").ok();
+    let asked = match threads {
+        Some(threads) => Some(("--threads ", threads)),
+        None => (of_environment.and_then(|n| n.parse().ok()))
+            // As rayon takes it: all cores.
+            .filter(|threads| *threads != 0)
+            .map(|threads| ("RAYON_NUM_THREADS=", threads)),
+    };
+    if let Some((of, threads)) = asked.filter(|(_, n)| !(1..=MOST_THREADS).contains(n)) {
+        return Err(Failure::user(format!(
+            "{of}{threads}: choose between 1 and {MOST_THREADS}"
+        )));
+    }
     match threads {
         None => match builder.build_global() {
             // An error without a cause says that the application has made the pool already.
@@ -137,9 +150,6 @@ fn in_pool<R: Send>(
             }
             _ => work(),
         },
-        Some(threads) if !(1..=MOST_THREADS).contains(&threads) => Err(Failure::user(format!(
-            "--threads {threads}: choose between 1 and {MOST_THREADS}"
-        ))),
         Some(threads) => (builder.num_threads(threads).build())
             .map_err(|error| failed(threads, error))?
             .install(work),

@@ -133,6 +133,7 @@ impl Remedy for StudyError {
         Some(match self {
             Self::Record(error) | Self::Channels { error, .. } => return error.remedy(),
             Self::Adaptation(error) => return error.remedy(),
+            Self::At { error, .. } => return error.remedy(),
             Self::NoTwin(_) | Self::Twin { .. } => "`truetwin twins` lists them".into(),
             Self::Twice { table, .. } => format!("[fixed] and [{table}] of the study file"),
             Self::AllFixed => "`truetwin fit` tests the twin on a record".into(),

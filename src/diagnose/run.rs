@@ -5,6 +5,8 @@ use super::report::Report;
 use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
 use super::thresholds::THRESHOLDS;
+use crate::fit::Warning;
+use crate::fit::doubts::STILL_OUTPUT;
 use crate::likelihood::{start_elsewhere, with_better_start};
 use crate::math::six_digits;
 use crate::progress::Progress;
@@ -167,8 +169,8 @@ fn check(
     let first = records.first().ok_or(StudyError::NoRecord)?;
     let expected = first.drive().dt();
     let measured = (records.iter().enumerate()).map(|(i, record)| (Some(i), record));
-    let validation = validation.map(|record| (None, record));
-    for (which, record) in measured.chain(validation) {
+    let held_out = validation.map(|record| (None, record));
+    for (which, record) in measured.chain(held_out) {
         (record.check_channels(&study.twin().signals()))
             .and_then(|()| study.twin().check_drive(record.drive()))
             .map_err(|error| StudyError::Channels {
@@ -194,7 +196,15 @@ fn check(
             });
         }
     }
-    Record::check_outputs(records, &study.twin().signals().outputs)?;
+    let signals = study.twin().signals();
+    Record::check_outputs(records, &signals.outputs)?;
+    let validation = validation.map_or(&[][..], std::slice::from_ref);
+    for (of, records) in [("records", records), ("validation record", validation)] {
+        let still = Warning::still(&signals, records).into_iter();
+        if still.filter(|told| told.code == STILL_OUTPUT).count() == signals.outputs.len() {
+            return Err(StudyError::Still(of));
+        }
+    }
     SettingError::unless_level("alpha", settings.alpha, 0.05)?;
     SettingError::unless_at_most("calibrate", settings.calibrate, MOST_SIMULATIONS)?;
     Ok(())

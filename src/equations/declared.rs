@@ -106,7 +106,7 @@ impl Declared {
         level: Id,
     ) -> Result<(), EquationsError> {
         match names.graph.constant(level) {
-            Some(level) if !(level >= 0.0 && level.is_finite()) => entry.error(format!(
+            Some(level) if level < 0.0 => entry.error(format!(
                 "noise = {level}; a standard deviation is 0 or more"
             )),
             _ => Ok(()),

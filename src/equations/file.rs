@@ -331,8 +331,14 @@ impl Reader<'_> {
         };
         let mut ids = [0; 2];
         for (id, end) in ids.iter_mut().zip(ends) {
-            let placed = entry.expression_of("an end of limits", end)?;
-            *id = self.names.value_within(&placed, Varies::ByParameters, OF)?;
+            let open = number(end.get_ref()).filter(|end| end.is_infinite());
+            *id = match open {
+                Some(end) => self.names.graph.number(end),
+                None => {
+                    let placed = entry.expression_of("an end of limits", end)?;
+                    self.names.value_within(&placed, Varies::ByParameters, OF)?
+                }
+            };
         }
         let known = ids.map(|id| self.names.graph.constant(id));
         if let [Some(low), Some(high)] = known

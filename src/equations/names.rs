@@ -196,13 +196,20 @@ impl<'t> Scope<'t> {
                 return Err(placed.problem(&self.source, (0, problem)));
             }
         }
-        stack.pop().ok_or_else(|| {
+        let id = stack.pop().ok_or_else(|| {
             EquationsError::at(
                 self.source.0,
                 placed.byte(0),
                 "an empty expression; write 0",
             )
-        })
+        })?;
+        match self.graph.constant(id).filter(|value| !value.is_finite()) {
+            None => Ok(id),
+            Some(value) => {
+                let problem = format!("the value is {value}; write what is a finite number");
+                Err(placed.problem(&self.source, (0, problem)))
+            }
+        }
     }
 
     /// As [`value`](Self::value), of what depends on no more than `most`; `what` says what it may use.

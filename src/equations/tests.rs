@@ -168,6 +168,18 @@ fn faults_are_one_line_with_their_place() {
             "low must be below high",
         ),
         (
+            "[constants]\ng = nan\n[states]\nh = { rate = \"g\" }\n",
+            "line 4, column 5: the value is NaN; write what is a finite number",
+        ),
+        (
+            "[states]\nh = { rate = \"1\", start = \"1/0\" }\n",
+            "the value is inf",
+        ),
+        (
+            "[states]\nh = { rate = \"1\", limits = [nan, \"k\"] }\n",
+            "the value is NaN",
+        ),
+        (
             "[states]\nh = { rate = true }\n",
             "rate of h is something else; write a number or an expression",
         ),

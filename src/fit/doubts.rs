@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 
 /// Code of a free run that diverges.
 pub(crate) const DIVERGES: &str = "free-run-diverges";
+/// Code of an output that keeps one value.
+pub(crate) const STILL_OUTPUT: &str = "constant-output";
 /// Code of a free run that shows nothing of the record.
 pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 
@@ -35,7 +37,7 @@ const REMEDIES: [(&str, &str); 20] = [
         "what acts through it cannot be told from a constant; take a record in which it moves",
     ),
     (
-        "constant-output",
+        STILL_OUTPUT,
         "a sensor that is stuck tells nothing of the twin; take a record in which it moves",
     ),
     (
@@ -183,12 +185,7 @@ impl Warning {
             one("constant-input", "input", &signals.inputs, |r| {
                 r.drive().inputs()
             }),
-            one(
-                "constant-output",
-                "output",
-                &signals.outputs,
-                Record::outputs,
-            ),
+            one(STILL_OUTPUT, "output", &signals.outputs, Record::outputs),
         ]
         .concat()
     }

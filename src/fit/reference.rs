@@ -54,43 +54,31 @@ impl Reference {
         let Some(filtered) = recoverable(problem.filtered(theta))? else {
             return Ok(None);
         };
-        let mut beside = Vec::new();
-        for (j, (moved, distance)) in problem.neighbours(theta).into_iter().enumerate() {
+        let mut reference = Self::bare(filtered);
+        let neighbours = problem.neighbours(theta);
+        let d = neighbours.len();
+        let mut directions = DMatrix::zeros(reference.r.len(), d);
+        for (j, (moved, distance)) in neighbours.into_iter().enumerate() {
+            // What is held answers nothing.
             if problem.axes[j].held {
-                // What is held answers nothing.
-                beside.push((filtered.clone(), distance));
                 continue;
             }
             let Some(there) = recoverable(problem.filtered(&moved))? else {
                 return Ok(None);
             };
-            beside.push((there, distance));
+            directions.set_column(j, &(reference.direction(&there) / distance));
         }
-        Ok(Self::with(filtered, &beside, known))
-    }
-
-    /// Builds the reference from innovations at θ̂ and a step beside it along each axis, and the information about θ.
-    pub fn with(
-        filtered: Vec<Filtered>,
-        beside: &[(Vec<Filtered>, f64)],
-        known: &DMatrix<f64>,
-    ) -> Option<Self> {
-        let mut reference = Self::bare(filtered);
-        let d = beside.len();
-        reference.directions = DMatrix::zeros(reference.r.len(), d);
-        for (j, (there, distance)) in beside.iter().enumerate() {
-            let direction = reference.direction(there) / *distance;
-            reference.directions.set_column(j, &direction);
-        }
-        let mut gram = reference.directions.tr_mul(&reference.directions);
+        let mut gram = directions.tr_mul(&directions);
         for j in 0..d {
             gram[(j, j)] *= 1.0 + 1e-12;
         }
         gram += known;
-        let factor = gram.cholesky()?;
-        reference.answer = factor.solve(&reference.directions.tr_mul(&reference.r));
-        reference.factor = factor;
-        Some(reference)
+        let Some(factor) = gram.cholesky() else {
+            return Ok(None);
+        };
+        reference.answer = factor.solve(&directions.tr_mul(&reference.r));
+        (reference.factor, reference.directions) = (factor, directions);
+        Ok(Some(reference))
     }
 
     /// Innovations alone, to take directions from; θ is not projected out.

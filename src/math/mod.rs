@@ -30,7 +30,7 @@ pub(crate) use statistics::{
 };
 pub(crate) use svd::{principal_axes, solve_truncated, thin_svd};
 pub(crate) use whitening::Whitening;
-pub(crate) use widest::{Kernel, wide, widest};
+pub(crate) use widest::{Kernel, is_wide, wide, widest};
 
 #[cfg(test)]
 pub(crate) use statistics::binomial_bounds;

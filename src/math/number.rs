@@ -15,7 +15,8 @@ pub(crate) fn nearest(value: f64, low: f64, high: f64) -> f64 {
 /// A number of each of several computations. These never branch apart: where one needs a case, all compute it, and a [`Condition`]
 /// selects. (The traits of num-traits ask for an order and for whole parts, which lanes do not have.)
 pub(crate) trait Number:
-    Copy
+    Send
+    + Copy
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>

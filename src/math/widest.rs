@@ -29,8 +29,18 @@ pub(crate) fn widest<K: Kernel>(kernel: K) -> K::Output {
     }
 }
 
+/// Returns whether the processor has wide vectors. Those other than x86-64 have one width, which counts as wide.
+#[inline]
+pub(crate) fn is_wide() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    let is_wide = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+    #[cfg(not(target_arch = "x86_64"))]
+    let is_wide = true;
+    is_wide
+}
+
 /// As [`widest`], on processors with wide vectors alone: a kernel is long to compile, and its caller may have another way. It comes back where
-/// there are none. Processors other than x86-64 have one width, which counts as wide.
+/// there are none.
 #[inline]
 pub(crate) fn wide<K: Kernel>(kernel: K) -> Result<K::Output, K> {
     #[cfg(target_arch = "x86_64")]
@@ -43,7 +53,7 @@ pub(crate) fn wide<K: Kernel>(kernel: K) -> Result<K::Output, K> {
         fn avx2<K: Kernel>(kernel: K) -> K::Output {
             kernel.run()
         }
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        if is_wide() {
             if is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512bw")
                 && is_x86_feature_detected!("avx512cd")

@@ -104,10 +104,11 @@ impl ParameterRow {
     fn note(&self) -> &'static str {
         let [low, high] = self.interval;
         let is_outside = high < self.prior.low() || low > self.prior.high();
+        let is_anywhere = low <= self.bounds.low() && high >= self.bounds.high();
         match (self.at_bound, self.role) {
             (Some(Side::Low), _) => "at lower bound",
             (Some(_), _) => "at upper bound",
-            (None, Role::Parameter) if self.prior_share >= 1.0 => "not identified",
+            (None, Role::Parameter) if self.prior_share >= 1.0 || is_anywhere => "not identified",
             (None, Role::Parameter) if is_outside => "outside prior",
             (None, _) => "",
         }
@@ -186,6 +187,8 @@ mod tests {
         };
         assert_eq!(note(0.5, 0.01), "");
         assert_eq!(note(0.5, 0.3), "not identified");
+        let anywhere = ParameterRow::new(&parameter, 1.0, 0.2, [0.0, 2.0]);
+        assert_eq!(anywhere.remark(), "not identified");
         assert_eq!(note(1.5, 0.01), "outside prior");
         assert_eq!(note(0.5, PRIOR_DEVIATION / 2.0), "share of prior 25 %");
         assert_eq!(note(1.05, 0.05), "");

@@ -13,6 +13,10 @@ impl Study {
     /// The study in the setting of a file about the same twin. θ becomes: the twin's parameters that are not fixed,
     /// unknown noise levels, unknown starts, effects' magnitudes that are not given. Of a file before, the plan of records stays alone.
     pub fn configure(&self, file: &StudyFile) -> Result<Self, StudyError> {
+        (self.configured(file)).map_err(|error| file.located(error))
+    }
+
+    fn configured(&self, file: &StudyFile) -> Result<Self, StudyError> {
         if file.twin != self.name {
             return Err(StudyError::Twin {
                 given: file.twin.clone(),
@@ -67,15 +71,19 @@ impl Study {
         if second != Adaptation::default() {
             twin = adapt(twin, &second, step)?;
         }
-        let fixed = |error: TwinError| StudyError::Table(format!("fixed: {error}"));
         let space = twin.parameters();
         for (name, &value) in &file.fixed {
             let position = space.position(name);
-            (position.and_then(|at| space[at].check_value(value))).map_err(fixed)?;
+            (position.and_then(|at| space[at].check_value(value))).map_err(|error| {
+                StudyError::Fixed {
+                    name: name.clone(),
+                    error,
+                }
+            })?;
         }
         let mut held = file.fixed.clone();
         held.extend(effects.iter().flat_map(Effect::given_by_parameter));
-        twin = fix(twin, &held).map_err(fixed)?;
+        twin = fix(twin, &held)?;
         if let Some(plan) = &plan {
             plan.check(&twin.signals())?;
         }
@@ -250,10 +258,8 @@ mod tests {
     fn substeps_have_a_range_and_need_equations() {
         for n in ["0", "1000000000"] {
             let message = refused(&format!("[record]\nsubsteps = {n}"));
-            assert_eq!(
-                message,
-                format!("substeps = {n}; choose between 1 and 1000")
-            );
+            let expected = format!("s.toml, line 3: substeps = {n}; choose between 1 and 1000");
+            assert_eq!(message, expected);
         }
         let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
         let study = Study::new("boxed", AtOnce::<1>(|a, u| a[0] * u), plan).unwrap();
@@ -311,6 +317,25 @@ mod tests {
     #[test]
     fn a_parameter_in_two_tables_is_refused() {
         let message = refused("[fixed]\nk1 = 0.5\n[bounds]\nk1 = [0.1, 1.0]");
-        assert_eq!(message, "k1 appears in both fixed and bounds; remove one");
+        let expected = "s.toml, line 5: k1 appears in both fixed and bounds; remove one";
+        assert_eq!(message, expected);
+    }
+
+    #[test]
+    fn a_wrong_value_is_told_by_its_line() {
+        for (tables, line, problem) in [
+            ("[record]\nsubsteps = 2\nstep = -1.0", 4, "step = -1"),
+            ("[prior]\n\nk1 = [0.2, 9.0]", 4, "prior [0.2, 9] of k1"),
+            ("[bounds]\nk1 = [0.7, 0.9]", 3, "prior [0.4, 0.8] of k1"),
+            ("[fixed]\nk2 = 0.5\nk1 = -5.0", 4, "fixed: k1 = -5"),
+            ("[fixed]\nk7 = 1.0", 3, "fixed: no parameter is called k7"),
+            ("[noise]\ny = 0.1\nh1 = nan", 4, "noise h1 = NaN"),
+            ("[start]\nh9 = 1.0", 3, "start names h9"),
+            ("[library]\nonly = ['foo']", 2, "library: foo"),
+        ] {
+            let expected = format!("s.toml, line {line}: {problem}");
+            let message = refused(tables);
+            assert!(message.starts_with(&expected), "{message}");
+        }
     }
 }

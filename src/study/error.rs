@@ -53,15 +53,15 @@ pub enum StudyError {
     /// Prior, bounds, limits, noise, starts or an effect do not fit the twin.
     #[error(transparent)]
     Adaptation(#[from] TwinError),
-    /// An effect of the study file is unknown, or does not fit the twin.
+    /// A value of the study file cannot be, or does not fit the twin.
     #[error("{}, line {line}: {error}", path.display())]
-    EffectAt {
+    At {
         /// File.
         path: PathBuf,
         /// Line, from 1.
         line: usize,
         /// The problem there, and the remedy.
-        error: TwinError,
+        error: Box<Self>,
     },
     /// The study file names no twin.
     #[error("{}: the key twin is missing; add twin = \"NAME\"", .0.display())]
@@ -69,6 +69,14 @@ pub enum StudyError {
     /// The twin's own parameters, or values of the study, are wrong.
     #[error("{0}")]
     Table(String),
+    /// A parameter cannot have its fixed value, or there is none of this name.
+    #[error("fixed: {error}")]
+    Fixed {
+        /// Name in the file.
+        name: String,
+        /// What is wrong.
+        error: TwinError,
+    },
     /// A parameter in two tables of a study.
     #[error("{name} appears in both fixed and {table}; remove one")]
     Twice {
@@ -144,6 +152,11 @@ pub enum StudyError {
         /// Least number of samples.
         least: usize,
     },
+    /// A diagnosis with records whose outputs all keep one value.
+    #[error(
+        "no output of the {0} ever changes, which tells nothing of the twin; take one in which an output moves"
+    )]
+    Still(&'static str),
     /// One of several records has channels or steps that the twin cannot have.
     #[error("{} does not fit the twin: {error}", name(*record))]
     Channels {
@@ -184,6 +197,21 @@ impl StudyError {
     pub(crate) const NO_FIT: Self = Self::NoFit {
         cause: String::new(),
     };
+
+    /// Returns the table and the key of a study file that it is about, if it is about one.
+    pub(super) fn key(&self) -> Option<(&'static str, &str)> {
+        Some(match self {
+            Self::Adaptation(TwinError::UnknownIn { table, name, .. })
+            | Self::Adaptation(TwinError::Value { table, name, .. })
+            | Self::Twice { table, name } => (table, name),
+            Self::Adaptation(TwinError::Parameter { name, .. }) => ("prior", name),
+            Self::Fixed { name, .. } => ("fixed", name),
+            Self::UnknownEffect(_) => ("library", ""),
+            // These begin with the key.
+            Self::Plan(problem) => ("record", problem.split([' ', ':']).next()?),
+            _ => return None,
+        })
+    }
 
     /// Returns what stands for the record that caused the error among what stands for all of them, if one did.
     pub(crate) fn culprit<'a, R>(

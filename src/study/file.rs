@@ -152,7 +152,11 @@ impl StudyFile {
         }
         let syntax = |error: toml::de::Error| {
             let start = error.span().map_or(0, |span| span.start);
-            wrong(line(text, start), error.message())
+            let line = line(text, start);
+            wrong(
+                line + lines_to_key(text, line, error.message()),
+                error.message(),
+            )
         };
         let mut table = DeTable::parse(text).map_err(syntax)?;
         check_shapes(table.get_ref())
@@ -210,15 +214,44 @@ impl StudyFile {
 
     /// Adds to the error of effect `index` its line, if the file was parsed from a text.
     pub(super) fn effect_error(&self, index: usize, error: TwinError) -> StudyError {
-        let place = self.origin.as_ref().and_then(|(path, text)| {
-            let line = line_of_effect(text, index, self.effect.get(index)?, &error)?;
-            Some((path.clone(), line))
-        });
-        match place {
-            Some((path, line)) => StudyError::EffectAt { path, line, error },
-            None => error.into(),
+        let line = |text: &str| line_of_effect(text, index, self.effect.get(index)?, &error);
+        let line = self.origin.as_ref().and_then(|(_, text)| line(text));
+        self.at(line, error.into())
+    }
+
+    /// Adds to an error the line of the value that it is about, if the file was parsed from a text that has it.
+    pub(super) fn located(&self, error: StudyError) -> StudyError {
+        let line = |text: &str| {
+            let (table, name) = error.key()?;
+            let line = line_of_value(text, table, name);
+            // What a prior leaves may be told in the other table alone.
+            let in_bounds = || line_of_value(text, "bounds", name);
+            line.or_else(|| (table == "prior").then(in_bounds)?)
+        };
+        let line = self.origin.as_ref().and_then(|(_, text)| line(text));
+        self.at(line, error)
+    }
+
+    fn at(&self, line: Option<usize>, error: StudyError) -> StudyError {
+        match (&self.origin, line) {
+            (Some((path, _)), Some(line)) => StudyError::At {
+                path: path.clone(),
+                line,
+                error: error.into(),
+            },
+            _ => error,
         }
     }
+}
+
+/// Returns the line of a value of a table, or else that of the table; none where the text has no such table.
+fn line_of_value(text: &str, table: &str, name: &str) -> Option<usize> {
+    let file = DeTable::parse(text).ok()?;
+    let table = file.get_ref().get(table)?;
+    // Names may be dotted.
+    let value = (table.get_ref().get(name))
+        .or_else(|| (name.split('.')).try_fold(table, |at, key| at.get_ref().get(key)));
+    Some(line(text, value.unwrap_or(table).span().start))
 }
 
 /// Returns the line of the value that `error` is about in effect `index` of a text; none where that is not `entry`, since a caller may
@@ -251,6 +284,21 @@ fn line_of_effect(
         _ => None,
     };
     Some(line(text, value.or(table.get("id"))?.span().start))
+}
+
+/// Returns how many lines below the first one of a table the key stands that a message is about, of which the parser tells the table alone:
+/// `k1: …` or ``… `blobs` …``.
+fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
+    let before_colon = message.split(": ").next().filter(|key| !key.contains(' '));
+    let Some(key) = before_colon.or_else(|| message.split('`').nth(1)) else {
+        return 0;
+    };
+    let mut of_table = (text.lines().skip(first)).take_while(|line| !line.starts_with('['));
+    let is_key = |line: &str| {
+        let rest = line.trim_start().strip_prefix(key);
+        rest.is_some_and(|rest| rest.trim_start().starts_with('='))
+    };
+    of_table.position(is_key).map_or(0, |below| 1 + below)
 }
 
 /// Returns the line, from 1, of a byte of a text.

@@ -18,6 +18,14 @@ pub enum TwinError {
     /// A name, a prior or bounds that cannot be: what is wrong, and the remedy.
     #[error("{0}")]
     Declaration(String),
+    /// A parameter with a prior or bounds that it cannot have.
+    #[error("{problem}")]
+    Parameter {
+        /// Name.
+        name: String,
+        /// Problem and remedy.
+        problem: String,
+    },
     /// A point with too many or too few numbers.
     #[error("{given} values for {expected} parameters ({names}); give one value for each")]
     Length {

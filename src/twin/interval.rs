@@ -59,9 +59,9 @@ impl Interval {
         self.low + 0.5 * self.width()
     }
 
-    /// Tells whether both ends are finite.
+    /// Tells whether both ends and the width are finite.
     pub fn is_finite(self) -> bool {
-        self.low.is_finite() && self.high.is_finite()
+        self.width().is_finite()
     }
 
     /// Tells whether `value` lies inside, ends included.

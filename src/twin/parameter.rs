@@ -124,19 +124,21 @@ impl Parameter {
             bounds,
             ..
         } = self;
-        for (kind, interval) in [("prior", prior), ("bounds", bounds)] {
-            if interval.check().is_err() || !interval.is_finite() {
-                return Err(TwinError::Declaration(format!(
-                    "{kind} of {name} is {interval}; write finite [low, high] with low < high"
-                )));
-            }
-        }
-        if !bounds.contains(prior.low()) || !bounds.contains(prior.high()) {
-            return Err(TwinError::Declaration(format!(
+        let is_wrong = |of: &Interval| of.check().is_err() || !of.is_finite();
+        let kinds = [("prior", prior), ("bounds", bounds)];
+        let problem = if let Some((kind, wrong)) = kinds.iter().find(|(_, of)| is_wrong(of)) {
+            format!("{kind} of {name} is {wrong}; write finite [low, high] with low < high")
+        } else if !bounds.contains(prior.low()) || !bounds.contains(prior.high()) {
+            format!(
                 "prior {prior} of {name} leaves its bounds {bounds}; shrink the prior or widen the bounds"
-            )));
-        }
-        Ok(())
+            )
+        } else {
+            return Ok(());
+        };
+        Err(TwinError::Parameter {
+            name: name.clone(),
+            problem,
+        })
     }
 
     /// Checks that a value lies within the bounds.

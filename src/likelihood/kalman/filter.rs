@@ -5,6 +5,7 @@ use super::normal::clip::clip;
 use super::{FilterError, FilterSettings};
 use crate::record::Record;
 use crate::twin::{Composed, Interval, ParameterSpace, TwinError};
+use std::sync::Arc;
 
 /// A filter for many θ on one record: what does not depend on θ is prepared once.
 ///
@@ -49,7 +50,7 @@ pub struct Kalman<'a> {
     pub(super) settings: &'a FilterSettings,
     pub(super) parameters: ParameterSpace,
     pub(super) states: usize,
-    pub(super) outputs: Vec<f64>,
+    pub(super) outputs: Arc<[f64]>,
     pub(super) channels: usize,
     /// `true` if outputs are missing.
     pub(super) gaps: bool,

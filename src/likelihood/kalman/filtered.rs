@@ -218,7 +218,7 @@ impl Kalman<'_> {
     /// with what had been shown by its first.
     fn predict_punctual(
         &self,
-        order: &Order<'_>,
+        order: &Order,
         theta: &[f64],
         states: &[Gaussian],
         to: &mut Predictions,
@@ -233,9 +233,12 @@ impl Kalman<'_> {
         let (samples, block) = (self.record.samples(), order.before);
         for first in (0..samples).step_by(block) {
             let shown = first.checked_sub(block + 1);
-            let from = shown.map(|k| (k, states[k].as_belief()));
             to.first = first;
-            Pass::new(size, jobs).run_from(from, (first + block).min(samples), to)?;
+            let mut pass = match shown {
+                Some(k) => Pass::behind(size, jobs, (k, states[k].as_belief()), to),
+                None => Pass::new(size, jobs),
+            };
+            pass.run_to((first + block).min(samples), to)?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Order in which a filter takes the values of a record.
 
 use super::{FilterError, Kalman};
-use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Values of a record beside the states that they show: those of an output with a dead time come so many samples earlier.
 ///
@@ -11,10 +11,11 @@ use std::borrow::Cow;
 /// ```
 ///
 /// A density of all values is the same in any order, and a filter need not remember d samples as states.
-pub(super) struct Order<'k> {
+#[derive(Clone)]
+pub(super) struct Order {
     /// Samples by which each output is late; empty where none is.
     dead_time: Vec<usize>,
-    values: Cow<'k, [f64]>,
+    values: Arc<[f64]>,
     channels: usize,
     /// Rows before the first.
     pub before: usize,
@@ -22,34 +23,34 @@ pub(super) struct Order<'k> {
     pub gaps: bool,
 }
 
-impl<'k> Order<'k> {
+impl Order {
     /// At θ, of which the length is checked.
-    pub fn of(kalman: &'k Kalman<'_>, theta: &[f64]) -> Result<Self, FilterError> {
+    pub fn of(kalman: &Kalman<'_>, theta: &[f64]) -> Result<Self, FilterError> {
         kalman.check(theta)?;
         let dead_time = (kalman.twin).dead_time(theta, kalman.record.drive().dt());
         let before = dead_time.iter().copied().max().unwrap_or(0);
         let mut order = Self {
             dead_time,
-            values: Cow::Borrowed(&kalman.outputs),
+            values: kalman.outputs.clone(),
             channels: kalman.channels,
             before,
             gaps: kalman.gaps || before > 0,
         };
         if before > 0 {
-            order.values = order.arranged(&kalman.outputs).into();
+            order.values = order.arranged(&kalman.outputs);
         }
         Ok(order)
     }
 
     /// The same without the outputs that are late, and without rows before the first.
-    pub fn punctual(&self, kalman: &Kalman<'_>) -> Order<'static> {
-        let mut values = kalman.outputs.clone();
+    pub fn punctual(&self, kalman: &Kalman<'_>) -> Self {
+        let mut values = kalman.outputs.to_vec();
         for row in values.chunks_exact_mut(self.channels) {
             for j in (0..self.channels).filter(|&j| self.is_late(j)) {
                 row[j] = f64::NAN;
             }
         }
-        Order {
+        Self {
             dead_time: vec![],
             values: values.into(),
             channels: self.channels,
@@ -58,7 +59,7 @@ impl<'k> Order<'k> {
         }
     }
 
-    fn arranged(&self, outputs: &[f64]) -> Vec<f64> {
+    fn arranged(&self, outputs: &[f64]) -> Arc<[f64]> {
         let p = self.channels;
         let samples = outputs.len() / p;
         (0..(self.before + samples) * p)

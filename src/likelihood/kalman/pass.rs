@@ -27,7 +27,7 @@ pub(super) struct Innovation<'w, N = f64> {
     pivots: &'w [N],
     /// Nats by which the density exceeds a normal one.
     excess: N,
-    order: &'w Order<'w>,
+    order: &'w Order,
     row: usize,
 }
 
@@ -112,7 +112,7 @@ impl<S: Size, N: Number> FilterState<S, N> {
 /// A record that a filter runs over, at θ.
 pub(super) struct FilterJob<'j> {
     pub kalman: &'j Kalman<'j>,
-    pub order: &'j Order<'j>,
+    pub order: Order,
     pub theta: &'j [f64],
     /// The record's drive as the twin sees it at θ.
     pub acting: Acting<'j>,
@@ -125,7 +125,7 @@ pub(super) struct Pass<'k, S: Size, N: FilterNumber> {
     jobs: &'k [FilterJob<'k>],
     /// The first job's; so is the order.
     kalman: &'k Kalman<'k>,
-    order: &'k Order<'k>,
+    order: &'k Order,
     now: Vec<Now<'k>>,
     moments: Moments<'k, S, N>,
     update: Update<S, N>,
@@ -139,14 +139,43 @@ pub(super) struct Pass<'k, S: Size, N: FilterNumber> {
     copy: FilterState<S, N>,
     floor: S::Vector<N>,
     readings: Vec<Readings>,
+    /// The row to come, and the state given those before it.
+    row: usize,
+    state: FilterState<S, N>,
     /// Lanes in which the filter works.
     valid: N::Condition,
 }
 
 impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
+    /// Before the first row.
     pub fn new(size: S, jobs: &'k [FilterJob<'k>]) -> Self {
+        let mut pass = Self::prepared(size, jobs);
+        pass.start();
+        pass
+    }
+
+    /// Behind row k, the state given rows up to which is known.
+    pub fn behind<K: Sink<N> + ?Sized>(
+        size: S,
+        jobs: &'k [FilterJob<'k>],
+        (k, known): (usize, Belief<'_, N>),
+        sink: &mut K,
+    ) -> Self {
+        let mut pass = Self::prepared(size, jobs);
+        let n = size.states();
+        let (mut root, mut state) = (Root::new(n), FilterState::zero(n));
+        state.set(known);
+        pass.go_to(k, &state);
+        pass.go_on(k, &mut state, &mut root, sink);
+        pass.row = k + 1;
+        pass.state = state;
+        pass
+    }
+
+    /// With all buffers, and without a state.
+    fn prepared(size: S, jobs: &'k [FilterJob<'k>]) -> Self {
         let (n, p) = (size.states(), size.outputs());
-        let FilterJob { kalman, order, .. } = jobs[0];
+        let FilterJob { kalman, order, .. } = &jobs[0];
         let readings: Vec<Option<Readings>> = (jobs.iter())
             .map(|job| Readings::of(&kalman.twin, job.theta))
             .collect();
@@ -168,6 +197,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             order,
             now: (jobs.iter()).map(|job| job.acting.at(0)).collect(),
             copy: FilterState::zero(n),
+            row: 0,
+            state: FilterState::zero(n),
             moments: Moments::new(size, kalman),
             update: Update::new(size),
             q: S::Vector::zeros(n),
@@ -187,62 +218,39 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         }
     }
 
-    /// Over the whole record; the log-likelihood, NaN in lanes that failed.
+    /// Goes on through the rows before `end`.
     #[inline(always)]
-    pub fn run<K: Sink<N> + ?Sized>(mut self, sink: &mut K) -> Result<N, FilterError> {
-        let mut root = Root::new(self.size.states());
-        let mut state = self.start();
-        for i in 0..self.order.rows() {
+    pub fn run_to<K: Sink<N> + ?Sized>(
+        &mut self,
+        end: usize,
+        sink: &mut K,
+    ) -> Result<(), FilterError> {
+        let n = self.size.states();
+        let mut root = Root::new(n);
+        // A copy: what a call has seen leaves the registers.
+        let mut state = FilterState::zero(n);
+        state.set(self.state.belief(n));
+        for i in self.row..end {
             self.measure(i, &mut state, &mut root, sink)?;
             if i >= self.order.before && i + 1 < self.order.rows() {
                 self.go_on(i - self.order.before, &mut state, &mut root, sink);
             }
         }
-        let total = self.update.likelihood.total();
-        Ok(self.valid.select(total, N::all(f64::NAN)))
-    }
-
-    /// From the state given rows up to `from`, or from the start, through rows before `to`.
-    pub fn run_from<K: Sink<N> + ?Sized>(
-        mut self,
-        from: Option<(usize, Belief<'_, N>)>,
-        to: usize,
-        sink: &mut K,
-    ) -> Result<(), FilterError> {
-        let n = self.size.states();
-        let mut root = Root::new(n);
-        let (first, mut state) = match from {
-            Some((k, belief)) => {
-                let mut state = FilterState::zero(n);
-                state.set(belief);
-                self.go_to(k, &state);
-                self.go_on(k, &mut state, &mut root, sink);
-                (k + 1, state)
-            }
-            None => (0, self.start()),
-        };
-        for k in first..to {
-            self.measure(k, &mut state, &mut root, sink)?;
-            self.go_on(k, &mut state, &mut root, sink);
-        }
+        self.state.set(state.belief(n));
+        self.row = end;
         Ok(())
     }
 
-    /// The first state.
-    #[inline(always)]
-    fn start(&mut self) -> FilterState<S, N> {
-        // In the copy: what a call has seen leaves the registers.
-        self.start_copy();
-        let n = self.size.states();
-        let mut state = FilterState::zero(n);
-        state.set(self.copy.belief(n));
-        state
+    /// log p of the rows so far, in nats; NaN in lanes that failed.
+    pub fn log_likelihood(&self) -> N {
+        let total = self.update.likelihood.total();
+        self.valid.select(total, N::all(f64::NAN))
     }
 
-    fn start_copy(&mut self) {
+    fn start(&mut self) {
         let n = self.size.states();
         let (mut mean, mut cov, mut scale) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n]);
-        let (means, covs) = self.copy.slices(n);
+        let (means, covs) = self.state.slices(n);
         for lane in 0..N::LANES {
             let i = held_by(lane, self.jobs.len());
             mean.fill(0.0);
@@ -262,9 +270,9 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 outputs: self.size.outputs(),
             };
             let mut state = FilterState::zero(n);
-            state.set(self.copy.belief(n));
-            Pass::new(any, self.jobs).run_to_first_row(steps, &mut state);
-            self.copy.set(state.belief(n));
+            state.set(self.state.belief(n));
+            Pass::prepared(any, self.jobs).run_to_first_row(steps, &mut state);
+            self.state.set(state.belief(n));
         }
     }
 

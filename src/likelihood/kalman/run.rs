@@ -6,12 +6,31 @@ mod start;
 use super::normal::clip::clip;
 use super::order::Order;
 use super::pass::{FilterJob, Pass, Sink};
-use super::size::{Any, with_size};
+use super::size::{Any, Size, with_size};
 use super::{FilterError, Kalman};
 use crate::twin::{Acting, Now};
 
-pub(super) use beside::{Together, together};
+pub(super) use beside::{LaneRows, SideBySide};
 pub(super) use start::spread_start;
+
+/// A pass of any size, which goes on in blocks of rows.
+pub(super) trait AnyPass<N>: Send {
+    /// Goes on through the rows before `end`.
+    fn run_to(&mut self, end: usize, sink: &mut dyn Sink<N>) -> Result<(), FilterError>;
+
+    /// log p of the rows so far, in nats; NaN in lanes that failed.
+    fn log_likelihood(&self) -> N;
+}
+
+impl<S: Size> AnyPass<f64> for Pass<'_, S, f64> {
+    fn run_to(&mut self, end: usize, sink: &mut dyn Sink) -> Result<(), FilterError> {
+        Pass::run_to(self, end, sink)
+    }
+
+    fn log_likelihood(&self) -> f64 {
+        Pass::log_likelihood(self)
+    }
+}
 
 impl Kalman<'_> {
     /// The record's drive as the twin sees it at θ, which is checked.
@@ -53,34 +72,45 @@ impl Kalman<'_> {
         self.run_in(&Order::of(self, theta)?, theta, sink)
     }
 
-    /// As [`run`](Self::run), the rows in this order. The pass is compiled once for all sinks, whose calls
-    /// are few beside a row's work.
+    /// As [`run`](Self::run), the rows in this order.
     pub(super) fn run_in(
         &self,
-        order: &Order<'_>,
+        order: &Order,
         theta: &[f64],
         sink: &mut dyn Sink,
     ) -> Result<f64, FilterError> {
-        let jobs = &[self.job(order, theta)?];
+        let job = &[self.job(order, theta)?];
+        let mut pass = self.pass(job);
+        let run = pass.run_to(order.rows(), sink);
+        run.map_err(|error| self.reason_of(error, theta))?;
+        Ok(pass.log_likelihood())
+    }
+
+    /// The pass of a job of this filter, before its first row. It is compiled once for all sinks, whose calls are few beside a row's work.
+    pub(super) fn pass<'j>(&self, job: &'j [FilterJob<'j>; 1]) -> Box<dyn AnyPass<f64> + 'j> {
         let (states, outputs) = (self.states, self.channels);
-        let run = with_size!(
+        with_size!(
             (states, outputs),
             [1 2 3 4 5 6 7 8 9 10],
-            |size| Pass::new(size, jobs).run(sink),
-            Pass::new(Any { states, outputs }, jobs).run(sink)
-        );
-        run.map_err(|error| self.twin.fault(theta).map_or(error, Into::into))
+            |size| Box::new(Pass::new(size, job)),
+            Box::new(Pass::new(Any { states, outputs }, job))
+        )
+    }
+
+    /// Returns what the twin says of the last run at θ, or else the error.
+    pub(super) fn reason_of(&self, error: FilterError, theta: &[f64]) -> FilterError {
+        self.twin.fault(theta).map_or(error, Into::into)
     }
 
     /// This filter at θ, the rows in this order.
     pub(super) fn job<'j>(
         &'j self,
-        order: &'j Order<'j>,
+        order: &Order,
         theta: &'j [f64],
     ) -> Result<FilterJob<'j>, FilterError> {
         Ok(FilterJob {
             kalman: self,
-            order,
+            order: order.clone(),
             theta,
             acting: self.acting(theta)?,
         })

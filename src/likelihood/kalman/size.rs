@@ -4,7 +4,7 @@ use crate::math::Number;
 
 /// States n and outputs p of a run. The pass is compiled for each implementation, so that loops over a [`Fixed`]
 /// size have known ends and numbers lie side by side.
-pub(super) trait Size: Copy {
+pub(super) trait Size: Copy + Send {
     /// n or p numbers.
     type Vector<N: Number>: Buffer<N>;
     /// n × n numbers.
@@ -18,7 +18,7 @@ pub(super) trait Size: Copy {
 }
 
 /// Numbers one after the other.
-pub(super) trait Buffer<N> {
+pub(super) trait Buffer<N>: Send {
     /// At least `length` zeros.
     fn zeros(length: usize) -> Self;
     fn numbers(&self) -> &[N];

@@ -218,3 +218,21 @@ fn a_record_too_short_to_hold_anything_back_is_diagnosed_without_a_share() {
     assert!(report["shrinkage"].is_null());
     assert!(read("report.html").contains(says));
 }
+
+#[test]
+fn records_that_never_move_are_refused() {
+    let moving = oscillation("moving.csv", 60, 0.05);
+    let still = place().join("still.csv").display().to_string();
+    let rows: String = (0..60)
+        .map(|k| format!("{},2.5\n", 0.05 * f64::from(k)))
+        .collect();
+    fs::write(&still, format!("t,y\n{rows}")).unwrap();
+    let out = place().join("never").display().to_string();
+    let to = ["--twin", "van-der-pol", "--out", &out];
+    let refused = |records: &[&str], of: &str| {
+        let told = format!("no output of the {of} ever changes");
+        refused(&[&["diagnose"], records, &to].concat(), &[&told]);
+    };
+    refused(&[&still], "records");
+    refused(&[&moving, "--validation", &still], "validation record");
+}

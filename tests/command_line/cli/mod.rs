@@ -364,6 +364,12 @@ fn wrong_calls_are_refused_with_the_remedy() {
         ],
         &["--threads 0"],
     );
+    let mut call = Command::new(env!("CARGO_BIN_EXE_truetwin"));
+    let call = call.args(["effects", "--twin", "tanks"]);
+    let output = call.env("RAYON_NUM_THREADS", "100000").output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.starts_with("error: RAYON_NUM_THREADS=100000: choose between 1 and 1024"));
     refused(
         &["estimate", &at("r.csv"), "--estimator", &at("r.csv")],
         &["r.csv", "truetwin pretrain"],
@@ -422,7 +428,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
     };
     check(
         "twin = 'tanks'\n[prior]\nk1 = [0.8, 0.4]\n",
-        &["line 2", "k1: invalid interval [0.8, 0.4]"],
+        &["line 3", "k1: invalid interval [0.8, 0.4]"],
     );
     check(
         "twin = 'tanks'\n[prior]\nk7 = [0.4, 0.8]\n",

@@ -5,10 +5,11 @@
 
 use crate::likelihood::kalman::order::Order;
 use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
-use crate::likelihood::kalman::size::{Size, with_size};
+use crate::likelihood::kalman::run::AnyPass;
+use crate::likelihood::kalman::size::{Any, Size, with_size};
 use crate::likelihood::kalman::update::Readings;
 use crate::likelihood::kalman::{FilterError, Kalman, Method, recoverable};
-use crate::math::{Kernel, LANES, Lanes, wide};
+use crate::math::{Kernel, LANES, Lanes, is_wide, wide};
 use crate::twin::MOST_STATES;
 use rayon::prelude::*;
 
@@ -16,33 +17,93 @@ use rayon::prelude::*;
 const TOO_FEW: usize = 2;
 
 /// Innovation and its variance, row by row; 0 and 1 where the output is missing.
-pub(in crate::likelihood::kalman) type LaneRows = Vec<[Lanes; 2]>;
+#[derive(Default)]
+pub(in crate::likelihood::kalman) struct LaneRows(pub Vec<[Lanes; 2]>);
 
 impl Sink<Lanes> for LaneRows {
-    #[inline(always)]
     fn innovation(&mut self, _: usize, of: &Innovation<'_, Lanes>) {
-        self.push([of.innovation[0], of.covariance[0]]);
+        self.0.push([of.innovation[0], of.covariance[0]]);
     }
 }
 
-/// Rows of up to eight filters run side by side.
-pub(in crate::likelihood::kalman) struct Together {
-    /// Lane of each filter that was asked for.
+/// Up to eight filters that go side by side, each at a θ.
+pub(in crate::likelihood::kalman) struct SideBySide<'k> {
+    jobs: Vec<FilterJob<'k>>,
+    /// Lane of each filter that was asked for; `None` where it needs more than lanes offer, and is to be run alone.
     lanes: Vec<Option<usize>>,
-    /// log p(y | θ) of each lane, in nats.
-    pub log_likelihoods: Lanes,
-    pub rows: LaneRows,
 }
 
-impl Together {
-    /// Lane of the i-th filter; `None` where it failed or needs more than lanes offer, and is to be run alone.
-    pub fn lane(&self, i: usize) -> Option<usize> {
-        self.lanes[i].filter(|&lane| self.log_likelihoods.0[lane].is_finite())
+impl<'k> SideBySide<'k> {
+    /// Filters that fit beside each other; `None` where all have to be run one by one.
+    pub fn of(all: &[(&'k Kalman<'_>, &'k [f64])]) -> Option<Self> {
+        let (first, _) = all.first()?;
+        if !first.fits_lanes() {
+            return None;
+        }
+        let mut jobs = Vec::with_capacity(LANES);
+        let lanes: Vec<Option<usize>> = (all.iter().take(LANES))
+            .map(|&(kalman, theta)| {
+                let order = Order::of(kalman, theta).ok()?;
+                let is_plain = Readings::of(&kalman.twin, theta).is_none() && order.before == 0;
+                jobs.push(is_plain.then(|| kalman.job(&order, theta).ok())??);
+                Some(jobs.len() - 1)
+            })
+            .collect();
+        (!jobs.is_empty()).then_some(Self { jobs, lanes })
     }
 
-    /// log p(y | θ) of the i-th filter, where it has a [`lane`](Self::lane).
-    fn log_likelihood(&self, i: usize) -> Option<f64> {
-        self.lane(i).map(|lane| self.log_likelihoods.0[lane])
+    /// Their pass, before the first row.
+    pub fn pass(&self) -> Box<dyn AnyPass<Lanes> + '_> {
+        let jobs = &self.jobs[..];
+        let any = Any {
+            states: jobs[0].kalman.states,
+            outputs: jobs[0].kalman.channels,
+        };
+        with_size!(
+            (any.states, any.outputs),
+            [1 2 3 4],
+            |size| Box::new(Pass::new(size, jobs)),
+            unreachable!("lanes hold few states: {any:?}")
+        )
+    }
+
+    /// Lane of the i-th filter, where it has one.
+    pub fn lane(&self, i: usize) -> Option<usize> {
+        self.lanes[i]
+    }
+
+    /// log p(y | θ) of the i-th filter, of those of all lanes; `None` where it failed or has no lane.
+    pub fn log_likelihood(&self, i: usize, of: &Lanes) -> Option<f64> {
+        self.lane(i)
+            .map(|lane| of.0[lane])
+            .filter(|value| value.is_finite())
+    }
+}
+
+impl<S: Size> AnyPass<Lanes> for Pass<'_, S, Lanes> {
+    fn run_to(&mut self, end: usize, sink: &mut dyn Sink<Lanes>) -> Result<(), FilterError> {
+        let pass = self;
+        wide(Block { pass, end, sink }).unwrap_or_else(|_| unreachable!("filters fit no lanes"))
+    }
+
+    fn log_likelihood(&self) -> Lanes {
+        Pass::log_likelihood(self)
+    }
+}
+
+/// Rows of a pass before `end`.
+struct Block<'p, 'k, S: Size> {
+    pass: &'p mut Pass<'k, S, Lanes>,
+    end: usize,
+    sink: &'p mut dyn Sink<Lanes>,
+}
+
+impl<S: Size> Kernel for Block<'_, '_, S> {
+    type Output = Result<(), FilterError>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        self.pass.run_to(self.end, self.sink)
     }
 }
 
@@ -53,6 +114,7 @@ impl Kalman<'_> {
             && self.channels == 1
             && self.settings.method == Method::Points
             && !self.twin.has_events()
+            && is_wide()
     }
 
     /// log p(y | θ) of several θ, in nats, on all cores; `None` where the filter does not work. Filters of few states run side by side.
@@ -70,11 +132,17 @@ impl Kalman<'_> {
         }
         let some = |thetas: &[Vec<f64>]| -> Result<Vec<Option<f64>>, FilterError> {
             let all: Vec<_> = thetas.iter().map(|theta| (self, &theta[..])).collect();
-            let lanes = match all.len() {
+            let found = match all.len() {
                 0..=TOO_FEW => None,
-                _ => together(&all),
+                _ => SideBySide::of(&all).and_then(|held| {
+                    let mut pass = held.pass();
+                    pass.run_to(self.record.samples(), &mut ()).ok()?;
+                    let values = pass.log_likelihood();
+                    let each = (0..all.len()).map(|i| held.log_likelihood(i, &values));
+                    Some(each.collect::<Vec<_>>())
+                }),
             };
-            let of_lane = |i| lanes.as_ref().and_then(|lanes| lanes.log_likelihood(i));
+            let of_lane = |i: usize| found.as_ref().and_then(|values| values[i]);
             (thetas.iter().enumerate())
                 .map(|(i, theta)| of_lane(i).map_or_else(|| alone(theta), |value| Ok(Some(value))))
                 .collect()
@@ -97,69 +165,6 @@ impl Kalman<'_> {
                 && self.twin.begins().is_none()
                 && [self, other].map(|k| k.record.drive().replicates()) == [0; 2]
                 && !(self.gaps || other.gaps)
-    }
-}
-
-/// Runs up to eight filters that fit beside each other, each at a θ, side by side; `None` where all have to be run one by one.
-pub(in crate::likelihood::kalman) fn together(all: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
-    let (first, _) = all.first()?;
-    if !first.fits_lanes() {
-        return None;
-    }
-    let all = &all[..all.len().min(LANES)];
-    let orders: Vec<Option<Order<'_>>> = (all.iter())
-        .map(|&(kalman, theta)| {
-            let order = Order::of(kalman, theta).ok()?;
-            let is_plain = Readings::of(&kalman.twin, theta).is_none() && order.before == 0;
-            is_plain.then_some(order)
-        })
-        .collect();
-    let held: Vec<Option<FilterJob<'_>>> = (all.iter().zip(&orders))
-        .map(|(&(kalman, theta), order)| {
-            Some(FilterJob {
-                kalman,
-                order: order.as_ref()?,
-                theta,
-                acting: kalman.acting(theta).ok()?,
-            })
-        })
-        .collect();
-    let mut used = 0..LANES;
-    let lanes = (held.iter())
-        .map(|job| job.as_ref().and_then(|_| used.next()))
-        .collect();
-    let jobs: Vec<FilterJob<'_>> = held.into_iter().flatten().collect();
-    if jobs.is_empty() {
-        return None;
-    }
-    let mut rows = Vec::with_capacity(first.record.samples());
-    let (jobs, to) = (&jobs[..], &mut rows);
-    let log_likelihoods = with_size!(
-        (first.states, first.channels),
-        [1 2 3 4],
-        |size| wide(SideBySide { size, jobs, to }).ok().flatten(),
-        None
-    )?;
-    Some(Together {
-        lanes,
-        log_likelihoods,
-        rows,
-    })
-}
-
-/// A pass of several jobs; `None` where all fail.
-struct SideBySide<'p, S> {
-    size: S,
-    jobs: &'p [FilterJob<'p>],
-    to: &'p mut LaneRows,
-}
-
-impl<S: Size> Kernel for SideBySide<'_, S> {
-    type Output = Option<Lanes>;
-
-    #[inline(always)]
-    fn run(self) -> Option<Lanes> {
-        Pass::new(self.size, self.jobs).run(self.to).ok()
     }
 }
 

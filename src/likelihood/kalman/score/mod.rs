@@ -3,13 +3,14 @@
 mod response;
 
 use super::order::Order;
-use super::pass::{Innovation, Sink};
-use super::run::{Together, together};
+use super::pass::{FilterJob, Innovation, Sink};
+use super::run::{AnyPass, LaneRows, SideBySide};
 use super::{Coordinates, FilterError, Kalman};
-use crate::math::{LANES, Stencil};
+use crate::math::{LANES, Lanes, Stencil};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 pub(crate) use response::Responses;
+use std::ops::Range;
 
 /// Gradient of the log-likelihood in the [`Coordinates`] φ, by central differences (one-sided at a bound); d parameters, N samples.
 ///
@@ -36,27 +37,48 @@ pub struct Score {
 /// Steps of one-sided differences over those of central ones.
 const FORWARD: f64 = 1e-2;
 
-/// Log-density, innovation and covariance of each row.
+/// Rows of a block: their values at eight points fill a tenth of a core's cache. Half or twice as many take the same time.
+const BLOCK: usize = 512;
+
+/// The blocks of a record, one after the other.
+fn blocks(rows: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..rows)
+        .step_by(BLOCK)
+        .map(move |first| first..(first + BLOCK).min(rows))
+}
+
+/// A derivative by one entry of φ, from two passes.
+struct Slope {
+    entry: usize,
+    /// The points, as their numbers in a list, and how far they are apart.
+    points: [usize; 2],
+    distance: f64,
+    /// Where between the points the slope is taken.
+    middle: f64,
+}
+
+/// Log-density, innovation and covariance of each row of a block.
 struct ScoreRows {
+    first: usize,
     width: usize,
     values: DVector<f64>,
 }
 
 impl ScoreRows {
-    fn new(kalman: &Kalman<'_>, order: &Order<'_>) -> Self {
-        let p = kalman.channels;
+    fn of(rows: Range<usize>, p: usize) -> Self {
         let width = 1 + p + p * p;
         Self {
+            first: rows.start,
             width,
-            values: DVector::zeros(order.rows() * width),
+            values: DVector::zeros(rows.len() * width),
         }
     }
 }
 
 impl Sink for ScoreRows {
     fn innovation(&mut self, i: usize, of: &Innovation<'_>) {
-        let p = of.innovation.len();
-        let row = &mut self.values.as_mut_slice()[i * self.width..(i + 1) * self.width];
+        let (p, at) = (of.innovation.len(), (i - self.first) * self.width);
+        let row = &mut self.values.as_mut_slice()[at..at + self.width];
         row[0] = of.log_density();
         row[1..=p].copy_from_slice(of.innovation);
         row[p + 1..].copy_from_slice(of.covariance);
@@ -73,11 +95,14 @@ impl Score {
         kalman.parameters.check_point(theta)?;
         let c = Coordinates::new(&kalman.parameters);
         let stencil = Stencil::new(&c.of(theta), c.steps(), c.lower(), c.upper())?;
-        let order = Order::of(kalman, theta)?;
-        let rows = |theta: &[f64]| rows(kalman, &order, theta);
-        let jacobian = stencil.jacobian(|phi| rows(&c.theta(phi)).map(|(_, rows)| rows))?;
-        let (log_likelihood, centre) = rows(theta)?;
-        Self::assemble(kalman, log_likelihood, &centre, &jacobian)
+        let points: Vec<Vec<f64>> = (stencil.points().iter()).map(|phi| c.theta(phi)).collect();
+        let thetas: Vec<&[f64]> = [theta]
+            .into_iter()
+            .chain(points.iter().map(|p| &p[..]))
+            .collect();
+        Self::of_passes(kalman, &thetas, theta.len(), |values| {
+            stencil.assemble(&values[1..])
+        })
     }
 
     /// As [`at`](Self::at), by one-sided differences with steps of a hundredth: d + 1 passes over the record instead of
@@ -135,38 +160,81 @@ impl Score {
         theta: &[f64],
         coordinates: &Coordinates,
     ) -> Result<Self, FilterError> {
-        let order = Order::of(kalman, theta)?;
-        let rows = |theta: &[f64]| rows(kalman, &order, theta);
-        let (log_likelihood, centre) = rows(theta)?;
         let phi = coordinates.of(theta);
-        let slope = |j: usize| {
-            let (moved, distance) = coordinates.beside(&phi, j, FORWARD);
-            let (_, there) = rows(&coordinates.theta(&moved))?;
-            // Times of events are told so sharply that half a step counts: the other side takes it away.
-            let (back, behind) = coordinates.beside(&phi, j, -FORWARD);
-            let is_central =
-                kalman.twin.has_events() && distance > 0.0 && back[j] >= coordinates.lower()[j];
-            let (other, behind) = match is_central {
-                true => (&rows(&coordinates.theta(&back))?.1, behind),
-                false => (&centre, 0.0),
+        let mut thetas = vec![theta.to_vec()];
+        let mut slopes = vec![];
+        for entry in coordinates.free() {
+            let mut point = |share: f64| {
+                let (moved, distance) = coordinates.beside(&phi, entry, share);
+                thetas.push(coordinates.theta(&moved));
+                (thetas.len() - 1, distance)
             };
-            let slope = (there - other) / (distance - behind);
-            Ok((slope, 0.5 * (distance + behind)))
-        };
-        let free = coordinates.free();
-        // Passes that wait for exchanges wait together.
-        let slopes: Result<Vec<(DVector<f64>, f64)>, FilterError> = match kalman.twin.beside() {
-            1 => free.iter().map(|j| slope(*j)).collect(),
-            _ => free.par_iter().map(|j| slope(*j)).collect(),
-        };
-        let slopes = slopes?;
-        let mut jacobian = DMatrix::zeros(centre.len(), phi.len());
-        for (&j, (slope, _)) in free.iter().zip(&slopes) {
-            jacobian.set_column(j, slope);
+            let (there, distance) = point(FORWARD);
+            // Times of events are told so sharply that half a step counts: the other side takes it away.
+            let (back, _) = coordinates.beside(&phi, entry, -FORWARD);
+            let is_central = kalman.twin.has_events()
+                && distance > 0.0
+                && back[entry] >= coordinates.lower()[entry];
+            let (other, behind) = match is_central {
+                true => point(-FORWARD),
+                false => (0, 0.0),
+            };
+            slopes.push(Slope {
+                entry,
+                points: [there, other],
+                distance: distance - behind,
+                middle: 0.5 * (distance + behind),
+            });
         }
-        let found = Self::assemble(kalman, log_likelihood, &centre, &jacobian)?;
-        let middles = slopes.iter().map(|(_, middle)| *middle);
-        Ok(found.led_back(coordinates, free.into_iter().zip(middles)))
+        let thetas: Vec<&[f64]> = thetas.iter().map(|theta| &theta[..]).collect();
+        let found = Self::of_passes(kalman, &thetas, phi.len(), |values| {
+            let mut jacobian = DMatrix::zeros(values[0].len(), phi.len());
+            for of in &slopes {
+                let [there, other] = of.points.map(|point| &values[point]);
+                jacobian.set_column(of.entry, &((there - other) / of.distance));
+            }
+            jacobian
+        })?;
+        Ok(found.led_back(coordinates, slopes.iter().map(|of| (of.entry, of.middle))))
+    }
+
+    /// From passes at points of which the first is θ: `jacobian` has the derivatives of the rows' values from those at the points.
+    ///
+    /// All passes go through a block of rows before the next: what a record needs at once does not grow with its length.
+    fn of_passes(
+        kalman: &Kalman<'_>,
+        thetas: &[&[f64]],
+        d: usize,
+        jacobian: impl Fn(&[DVector<f64>]) -> DMatrix<f64>,
+    ) -> Result<Self, FilterError> {
+        let order = Order::of(kalman, thetas[0])?;
+        let jobs: Vec<[FilterJob<'_>; 1]> = (thetas.iter())
+            .map(|theta| Ok([kalman.job(&order, theta)?]))
+            .collect::<Result<_, FilterError>>()?;
+        let mut passes: Vec<_> = jobs.iter().map(|job| kalman.pass(job)).collect();
+        let mut score = Self::of_no_rows(d);
+        for rows in blocks(order.rows()) {
+            let values = |(pass, theta): (&mut Box<dyn AnyPass<f64> + '_>, &&[f64])| {
+                let mut to = ScoreRows::of(rows.clone(), kalman.channels);
+                let run = pass.run_to(rows.end, &mut to);
+                run.map_err(|error| kalman.reason_of(error, theta))?;
+                Ok(to.values)
+            };
+            // Passes that wait for exchanges wait together.
+            let values: Result<Vec<DVector<f64>>, FilterError> = match kalman.twin.beside() {
+                1 => passes.iter_mut().zip(thetas).map(values).collect(),
+                _ => passes.par_iter_mut().zip(thetas).map(values).collect(),
+            };
+            let values = values?;
+            (score.add_rows(&values[0], &jacobian(&values), kalman.channels)).map_err(|i| {
+                let k = order.state_of(rows.start + i);
+                FilterError::NoSpread {
+                    at: kalman.record.drive().time(k),
+                }
+            })?;
+        }
+        score.log_likelihood = passes[0].log_likelihood();
+        Ok(score)
     }
 
     /// Leads slopes, each taken at a distance along its entry, back to the centre.
@@ -183,58 +251,79 @@ impl Score {
         self
     }
 
-    /// From derivatives of log-densities and of innovations and variances, both in standard deviations.
-    fn of_one_output(
-        log_likelihood: f64,
-        samples: &DMatrix<f64>,
-        changes: [&DMatrix<f64>; 2],
-    ) -> Self {
-        let [shift, spread] = changes;
+    fn of_no_rows(d: usize) -> Self {
         Self {
-            log_likelihood,
-            gradient: samples.row_sum_tr(),
-            fisher: shift.tr_mul(shift) + spread.tr_mul(spread) * 0.5,
+            log_likelihood: 0.0,
+            gradient: DVector::zeros(d),
+            fisher: DMatrix::zeros(d, d),
         }
     }
 
-    fn assemble(
-        kalman: &Kalman<'_>,
-        log_likelihood: f64,
+    /// Adds rows by derivatives of log-densities and of innovations and variances, both in standard deviations.
+    fn add_one_output(&mut self, samples: &DMatrix<f64>, changes: [&DMatrix<f64>; 2]) {
+        let [shift, spread] = changes;
+        self.gradient += samples.row_sum_tr();
+        self.fisher.gemm_tr(1.0, shift, shift, 1.0);
+        self.fisher.gemm_tr(0.5, spread, spread, 1.0);
+    }
+
+    /// With rows that lanes found at θ and at the points beside it.
+    fn with_lanes(mut self, each: &[(&LaneRows, usize)], moves: &[Move]) -> Self {
+        let (centre, c) = each[0];
+        let (n, d) = (centre.0.len(), self.gradient.len());
+        let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
+        // Reciprocals of variance and deviation.
+        let scales: Vec<[f64; 2]> = (centre.0.iter())
+            .map(|[_, s]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
+            .collect();
+        for ((moved, m), to) in each[1..].iter().zip(moves) {
+            let (m, j) = (*m, to.entry);
+            let rows = (centre.0.iter().zip(&moved.0)).zip(&scales);
+            let [samples, shifts, spreads] = [&mut samples, &mut shifts, &mut spreads]
+                .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
+            let results = samples.zip(shifts).zip(spreads);
+            let per_distance = 1.0 / to.distance;
+            for (([[e, _], [e_moved, s_moved]], [per_s, per_sd]), ((sample, shift), spread)) in
+                rows.map(|((a, b), scale)| ([a, b], scale)).zip(results)
+            {
+                let (e, e_moved, s_moved) = (e.0[c], e_moved.0[m], s_moved.0[m]);
+                let ratio = s_moved * per_s;
+                let square = e_moved * e_moved / s_moved - e * e * per_s;
+                *sample = -0.5 * (ln_near_one(ratio) + square) * per_distance;
+                *shift = (e_moved - e) * per_distance * per_sd;
+                *spread = (ratio - 1.0) * per_distance;
+            }
+        }
+        self.add_one_output(&samples, [&shifts, &spreads]);
+        self
+    }
+
+    /// Adds rows by their values and the derivatives of these; fails with the row whose innovations have no spread.
+    fn add_rows(
+        &mut self,
         centre: &DVector<f64>,
         jacobian: &DMatrix<f64>,
-    ) -> Result<Self, FilterError> {
-        let p = kalman.channels;
+        p: usize,
+    ) -> Result<(), usize> {
         let (d, width) = (jacobian.ncols(), 1 + p + p * p);
         let n = centre.len() / width;
-        let before = n - kalman.record.samples();
         let samples = DMatrix::from_fn(n, d, |k, j| jacobian[(k * width, j)]);
-        let fisher = if p == 1 {
+        if p == 1 {
             let scale = |k: usize| centre[k * width + 2];
             let shift =
                 DMatrix::from_fn(n, d, |k, j| jacobian[(k * width + 1, j)] / scale(k).sqrt());
             let change = DMatrix::from_fn(n, d, |k, j| jacobian[(k * width + 2, j)] / scale(k));
-            let changes = [&shift, &change];
-            return Ok(Self::of_one_output(log_likelihood, &samples, changes));
-        } else {
-            let mut fisher = DMatrix::zeros(d, d);
-            for k in 0..n {
-                let (at, end) = (k * width + 1, (k + 1) * width);
-                add_information(
-                    &centre.as_slice()[at + p..end],
-                    &jacobian.rows(at, p + p * p),
-                    &mut fisher,
-                )
-                .ok_or_else(|| FilterError::NoSpread {
-                    at: kalman.record.drive().time(k.saturating_sub(before)),
-                })?;
-            }
-            fisher
-        };
-        Ok(Self {
-            log_likelihood,
-            gradient: samples.row_sum_tr(),
-            fisher,
-        })
+            self.add_one_output(&samples, [&shift, &change]);
+            return Ok(());
+        }
+        self.gradient += samples.row_sum_tr();
+        for k in 0..n {
+            let (at, end) = (k * width + 1, (k + 1) * width);
+            let covariance = &centre.as_slice()[at + p..end];
+            let change = &jacobian.rows(at, p + p * p);
+            add_information(covariance, change, &mut self.fisher).ok_or(k)?;
+        }
+        Ok(())
     }
 }
 
@@ -264,25 +353,56 @@ fn side_by_side(
         .flat_map(|kalman| thetas.iter().map(move |theta| (kalman, *theta)))
         .collect();
     let lanes = lanes_of(kalmans);
-    let runs: Vec<Option<Together>> = match kalmans.first().map_or(1, |kalman| kalman.twin.beside())
-    {
-        1 => all.chunks(lanes).map(together).collect(),
-        _ => all.par_chunks(lanes).map(together).collect(),
+    let held: Vec<_> = all.chunks(lanes).map(SideBySide::of).collect();
+    let mut passes: Vec<Option<LanePass<'_>>> = (held.iter())
+        .map(|held| held.as_ref().map(SideBySide::pass))
+        .collect();
+    // Pass and lane of each filter of a record.
+    let place = |job: usize| Some((job / lanes, held[job / lanes].as_ref()?.lane(job % lanes)?));
+    let places: Vec<Option<Vec<(usize, usize)>>> = (0..kalmans.len())
+        .map(|record| record * thetas.len()..(record + 1) * thetas.len())
+        .map(|jobs| jobs.map(place).collect())
+        .collect();
+    let mut scores: Vec<Option<Score>> = (places.iter())
+        .map(|places| places.as_ref().map(|_| Score::of_no_rows(phi.len())))
+        .collect();
+    let (beside, samples) = (kalmans.first()).map_or((1, 0), |kalman| {
+        (kalman.twin.beside(), kalman.record.samples())
+    });
+    for rows in blocks(samples) {
+        let values = |pass: &mut Option<LanePass<'_>>| {
+            let mut to = LaneRows::default();
+            let run = pass.as_mut()?.run_to(rows.end, &mut to);
+            *pass = pass.take().filter(|_| run.is_ok());
+            pass.as_ref().map(|_| to)
+        };
+        let values: Vec<Option<LaneRows>> = match beside {
+            1 => passes.iter_mut().map(values).collect(),
+            _ => passes.par_iter_mut().map(values).collect(),
+        };
+        for (score, places) in scores.iter_mut().zip(&places) {
+            let rows = |&(pass, lane): &(usize, usize)| Some((values[pass].as_ref()?, lane));
+            let each = |places: &Vec<(usize, usize)>| places.iter().map(rows).collect();
+            let each: Option<Vec<(&LaneRows, usize)>> = places.as_ref().and_then(each);
+            *score = each.and_then(|each| Some(score.take()?.with_lanes(&each, &moves)));
+        }
+    }
+    let log_likelihood = |&(pass, lane): &(usize, usize)| {
+        let values = passes[pass].as_ref()?.log_likelihood();
+        Some(values.0[lane]).filter(|value| value.is_finite())
     };
-    (0..kalmans.len())
-        .map(|r| {
-            let each: Option<Vec<(&Together, usize)>> = (r * thetas.len()..(r + 1) * thetas.len())
-                .map(|job| {
-                    let run = runs[job / lanes].as_ref()?;
-                    Some((run, run.lane(job % lanes)?))
-                })
-                .collect();
-            let score = of_lanes(&each?, &moves, phi.len());
+    (scores.into_iter().zip(&places))
+        .map(|(score, places)| {
+            let mut score = score?;
+            let all = places.as_ref()?.iter().map(log_likelihood);
+            score.log_likelihood = all.collect::<Option<Vec<f64>>>()?[0];
             let middles = moves.iter().map(|to| (to.entry, 0.5 * to.distance));
             Some(score.led_back(coordinates, middles))
         })
         .collect()
 }
+
+type LanePass<'p> = Box<dyn AnyPass<Lanes> + 'p>;
 
 /// Number of passes that go in lanes of one: where each waits for exchanges that passes share, and lanes would ask one after the other, one.
 fn lanes_of(kalmans: &[Kalman<'_>]) -> usize {
@@ -300,37 +420,6 @@ struct Move {
     /// Its move in φ.
     distance: f64,
     theta: Vec<f64>,
-}
-
-/// Score of a record from its lanes at θ and at the points beside it; d parameters.
-fn of_lanes(each: &[(&Together, usize)], moves: &[Move], d: usize) -> Score {
-    let (centre, c) = each[0];
-    let n = centre.rows.len();
-    let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
-    // Reciprocals of variance and deviation.
-    let scales: Vec<[f64; 2]> = (centre.rows.iter())
-        .map(|[_, s]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
-        .collect();
-    for ((moved, m), to) in each[1..].iter().zip(moves) {
-        let (m, j) = (*m, to.entry);
-        let rows = (centre.rows.iter().zip(&moved.rows)).zip(&scales);
-        let [samples, shifts, spreads] = [&mut samples, &mut shifts, &mut spreads]
-            .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
-        let results = samples.zip(shifts).zip(spreads);
-        let per_distance = 1.0 / to.distance;
-        for (([[e, _], [e_moved, s_moved]], [per_s, per_sd]), ((sample, shift), spread)) in
-            rows.map(|((a, b), scale)| ([a, b], scale)).zip(results)
-        {
-            let (e, e_moved, s_moved) = (e.0[c], e_moved.0[m], s_moved.0[m]);
-            let ratio = s_moved * per_s;
-            let square = e_moved * e_moved / s_moved - e * e * per_s;
-            *sample = -0.5 * (ln_near_one(ratio) + square) * per_distance;
-            *shift = (e_moved - e) * per_distance * per_sd;
-            *spread = (ratio - 1.0) * per_distance;
-        }
-    }
-    let log_likelihood = centre.log_likelihoods.0[c];
-    Score::of_one_output(log_likelihood, &samples, [&shifts, &spreads])
 }
 
 /// ln, by its series where it is short.
@@ -366,15 +455,4 @@ fn add_information(
         }
     }
     Some(())
-}
-
-fn rows(
-    kalman: &Kalman<'_>,
-    order: &Order<'_>,
-    theta: &[f64],
-) -> Result<(f64, DVector<f64>), FilterError> {
-    let mut rows = ScoreRows::new(kalman, order);
-    let sink: &mut dyn Sink = &mut rows;
-    let log_likelihood = kalman.run_in(order, theta, sink)?;
-    Ok((log_likelihood, rows.values))
 }

@@ -43,14 +43,20 @@ fn agree(twin: impl Into<Composed>, centre: &[f64], record: &Record, settings: &
     let kalman = Kalman::new(twin, record, settings).unwrap().of_cells();
     let thetas = thetas(centre);
     let all: Vec<_> = thetas.iter().map(|theta| (&kalman, &theta[..])).collect();
-    let lanes = together(&all).unwrap();
+    let held = SideBySide::of(&all).unwrap();
+    let (mut pass, mut rows) = (held.pass(), LaneRows::default());
+    // In blocks, as a score takes them.
+    for end in [1, 64, record.samples()] {
+        pass.run_to(end, &mut rows).unwrap();
+    }
     for (i, theta) in thetas.iter().enumerate() {
-        let lane = lanes.lane(i).unwrap();
+        let lane = held.lane(i).unwrap();
         let scalar = kalman.filter(theta).unwrap();
-        let (found, expected) = (lanes.log_likelihoods.0[lane], scalar.log_likelihood);
+        let found = held.log_likelihood(i, &pass.log_likelihood()).unwrap();
+        let expected = scalar.log_likelihood;
         let error = (found - expected).abs() / expected.abs().max(1.0);
         assert!(error < 1e-10, "lane {lane}: {found} {expected}");
-        for (k, [e, s]) in lanes.rows.iter().enumerate() {
+        for (k, [e, s]) in rows.0.iter().enumerate() {
             let (scale, variance) = (s.0[lane].sqrt(), scalar.covariances[[k, 0, 0]]);
             // A point within rounding of a limit, where a root bends without end, is moved by the root of rounding.
             assert!((e.0[lane] - scalar.innovations[[k, 0]]).abs() < 1e-9 * scale);
@@ -161,9 +167,9 @@ fn what_lanes_do_not_hold_is_run_one_by_one() {
     let measured = record(CascadedTanks, &CENTRE, &tanks_drive(), 0);
     let kalman = Kalman::new(CascadedTanks, &measured, &settings).unwrap();
     let coordinates = Coordinates::new(kalman.parameters());
-    let lanes = together(&[(&kalman, &[f64::NAN; 4]), (&kalman, &CENTRE)]).unwrap();
-    assert_eq!(lanes.lane(0), None);
-    assert!(lanes.lane(1).is_some());
+    let both = [(&kalman, &[f64::NAN; 4][..]), (&kalman, &CENTRE)];
+    let held = SideBySide::of(&both).unwrap();
+    assert_eq!([held.lane(0), held.lane(1)], [None, Some(0)]);
     assert!(Score::forward(&kalman, &[f64::NAN; 4], &coordinates).is_err());
     assert!(Score::forward(&kalman, &[1.0], &coordinates).is_err());
     let saturated = Catalogue::default()
@@ -174,7 +180,7 @@ fn what_lanes_do_not_hold_is_run_one_by_one() {
     let theta = [&CENTRE[..], &[0.0, 2.0]].concat();
     let measured = record(twin, &theta, &tanks_drive(), 0);
     let kalman = Kalman::new(twin, &measured, &settings).unwrap();
-    assert!(together(&[(&kalman, &theta)]).is_some());
+    assert!(SideBySide::of(&[(&kalman, &theta)]).is_some());
     let coordinates = Coordinates::new(kalman.parameters());
     let one = Score::forward_one_by_one(&kalman, &theta, &coordinates).unwrap();
     let beside = Score::forward(&kalman, &theta, &coordinates).unwrap();
