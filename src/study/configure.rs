@@ -268,7 +268,8 @@ mod tests {
             let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
             let message = study.configure(&file).unwrap_err().to_string();
             let name = key.split(' ').next().unwrap();
-            assert!(message.starts_with(&format!("{name} needs")), "{message}");
+            let expected = format!("s.toml, line 3: {name} needs");
+            assert!(message.starts_with(&expected), "{message}");
             assert!(message.ends_with("remove it"), "{message}");
         }
     }

@@ -69,12 +69,12 @@ pub enum StudyError {
     /// The twin's own parameters, or values of the study, are wrong.
     #[error("{0}")]
     Table(String),
-    /// A parameter cannot have its fixed value, or there is none of this name.
+    /// A fixed value that its parameter cannot have, or of a name that none has.
     #[error("fixed: {error}")]
     Fixed {
         /// Name in the file.
         name: String,
-        /// What is wrong.
+        /// Problem and remedy.
         error: TwinError,
     },
     /// A parameter in two tables of a study.
@@ -207,6 +207,7 @@ impl StudyError {
             Self::Adaptation(TwinError::Parameter { name, .. }) => ("prior", name),
             Self::Fixed { name, .. } => ("fixed", name),
             Self::UnknownEffect(_) => ("library", ""),
+            Self::Record(RecordError::Step(_)) => ("record", "step"),
             // These begin with the key.
             Self::Plan(problem) => ("record", problem.split([' ', ':']).next()?),
             _ => return None,

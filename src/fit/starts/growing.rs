@@ -11,6 +11,15 @@ use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::twin::Noise;
 
+/// The same twin on the beginning of long records; `None` where that is more than a first share of them.
+///
+/// Searches move where many rows agree, and a long record repeats what its beginning tells: to find tops there, and to end them on all rows,
+/// takes a few passes of the whole in place of all.
+pub(super) fn sketch(problem: &Problem) -> Option<Problem> {
+    let share = BUDGET.sketched_rows as f64 / problem.samples() as f64;
+    (share < BUDGET.grown_shares[0] && !problem.is_simulated()).then(|| begun(problem, share))
+}
+
 /// The same twin on the beginning of each record.
 fn begun(problem: &Problem, share: f64) -> Problem {
     let part = |r: &Record| {

@@ -5,7 +5,7 @@ pub(crate) mod growing;
 mod scan;
 mod spectral;
 
-use growing::grown;
+use growing::{grown, sketch};
 use scan::scanned;
 pub(crate) use spectral::spectral_starts;
 
@@ -162,8 +162,9 @@ fn screened(problem: &Problem, noise: Noise, screen: Screen) -> Result<Vec<Vec<f
             }
         })
         .collect();
+    let sketch = sketch(problem);
     let mut starts: Vec<Vec<f64>> = vec![];
-    for theta in ranked(problem, points)? {
+    for theta in ranked(sketch.as_ref().unwrap_or(problem), points)? {
         let is_new = |one: &Vec<f64>| !screen.is_apart || is_apart(problem, one, &theta);
         if starts.len() < BUDGET.screened_starts && starts.iter().all(is_new) {
             starts.push(theta);
@@ -188,14 +189,22 @@ fn is_apart(problem: &Problem, one: &[f64], other: &[f64]) -> bool {
         })
 }
 
-/// Searches from all starts, best first.
+/// Searches from all starts, best first; those of long records go over their [`sketch`] first.
 pub(super) fn climbs(
     problem: &Problem,
     starts: &[Vec<f64>],
     iterations: usize,
 ) -> Result<Vec<Fitted>, FilterError> {
+    let sketch = sketch(problem);
+    let search = |start: &Vec<f64>| {
+        let found = match &sketch {
+            Some(sketch) => climb(sketch, start, iterations)?.map(|fit| fit.theta),
+            None => None,
+        };
+        climb(problem, found.as_ref().unwrap_or(start), iterations)
+    };
     let mut fits: Vec<Fitted> = (starts.par_iter())
-        .filter_map(|start| climb(problem, start, iterations).transpose())
+        .filter_map(|start| search(start).transpose())
         .collect::<Result<_, _>>()?;
     sort(&mut fits);
     Ok(fits)

@@ -125,16 +125,15 @@ impl States {
 
     pub(super) fn map(&mut self, f: impl Fn(Gaussian) -> Gaussian) {
         for k in 0..self.means.nrows() {
-            let state = Gaussian {
-                mean: self.means.row(k).to_vec(),
-                cov: self
-                    .covariances
-                    .slice(s![k, .., ..])
-                    .iter()
-                    .copied()
-                    .collect(),
-            };
-            self.set(k, f(state).as_belief());
+            self.set(k, f(self.row(k)).as_belief());
+        }
+    }
+
+    pub(super) fn row(&self, k: usize) -> Gaussian {
+        let covariance = self.covariances.slice(s![k, .., ..]);
+        Gaussian {
+            mean: self.means.row(k).to_vec(),
+            cov: covariance.iter().copied().collect(),
         }
     }
 

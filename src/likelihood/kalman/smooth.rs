@@ -5,20 +5,24 @@ use super::pass::Sink;
 use super::{FilterError, Kalman, States};
 use crate::record::Signal;
 
+/// Rows as the backward pass needs them.
 struct Tape {
-    filtered: Vec<Gaussian>,
-    carried: Vec<(Gaussian, Vec<f64>)>,
+    filtered: States,
+    /// Mean and covariance of the next row, and the covariance with it, row by row.
+    carried: Vec<f64>,
 }
 
 impl Sink for Tape {
     fn wants_carried(&self) -> bool {
         true
     }
-    fn filtered(&mut self, _: usize, state: Belief<'_>) {
-        self.filtered.push(Gaussian::of(state));
+    fn filtered(&mut self, k: usize, state: Belief<'_>) {
+        self.filtered.set(k, state);
     }
     fn carried(&mut self, _: usize, next: Belief<'_>, cross: &[f64]) {
-        self.carried.push((Gaussian::of(next), cross.to_vec()));
+        for part in [next.mean, next.cov, cross] {
+            self.carried.extend_from_slice(part);
+        }
     }
 }
 
@@ -73,26 +77,30 @@ impl Kalman<'_> {
     /// Smoothed states, and P⁻⁻¹·(m − m⁻) of each row: how strongly the rows from it on pull its prediction (N × n).
     fn backwards(&self, theta: &[f64]) -> Result<(States, Signal), FilterError> {
         let samples = self.record.samples();
+        let n = self.states;
+        let (both, width) = (n + n * n, n + 2 * n * n);
         let mut tape = Tape {
-            filtered: Vec::with_capacity(samples),
-            carried: Vec::with_capacity(samples),
+            filtered: States::new(samples, n),
+            carried: Vec::with_capacity(samples.saturating_sub(1) * width),
         };
         self.run(theta, &mut tape)?;
-        let n = self.states;
-        let mut states = States::new(samples, n);
+        // Each row is smoothed in its place.
+        let (mut states, mut carried) = (tape.filtered, tape.carried);
         let mut pulls = Signal::zeros((samples, n));
         let mut root = <Root>::new(n);
         let mut later = Gaussian::zero(n);
         let mut change = vec![0.0; n * n];
         let mut left = vec![0.0; n * n];
         for k in (0..samples).rev() {
-            let mut state = tape.filtered[k].clone();
-            if let Some((next, gain)) = tape.carried.get_mut(k) {
-                root.factor(&next.mean, &next.cov);
+            let mut state = states.row(k);
+            if let Some(row) = carried.get_mut(k * width..(k + 1) * width) {
+                let (next, gain) = row.split_at_mut(both);
+                let (next_mean, next_cov) = next.split_at(n);
+                root.factor(next_mean, next_cov);
                 for row in gain.chunks_exact_mut(n) {
                     root.solve(row);
                 }
-                let mut pull: Vec<f64> = (later.mean.iter().zip(&next.mean))
+                let mut pull: Vec<f64> = (later.mean.iter().zip(next_mean))
                     .map(|(later, next)| later - next)
                     .collect();
                 root.solve(&mut pull);
@@ -103,10 +111,10 @@ impl Kalman<'_> {
                     .for_each(|(to, v)| *to = v);
                 for (i, row) in gain.chunks_exact(n).enumerate() {
                     for (j, g) in row.iter().enumerate() {
-                        state.mean[i] += g * (later.mean[j] - next.mean[j]);
+                        state.mean[i] += g * (later.mean[j] - next_mean[j]);
                     }
                 }
-                for ((to, a), b) in change.iter_mut().zip(&later.cov).zip(&next.cov) {
+                for ((to, a), b) in change.iter_mut().zip(&later.cov).zip(next_cov) {
                     *to = a - b;
                 }
                 product(gain, &change, n, &mut left);

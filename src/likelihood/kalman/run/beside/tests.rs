@@ -169,7 +169,11 @@ fn what_lanes_do_not_hold_is_run_one_by_one() {
     let coordinates = Coordinates::new(kalman.parameters());
     let both = [(&kalman, &[f64::NAN; 4][..]), (&kalman, &CENTRE)];
     let held = SideBySide::of(&both).unwrap();
-    assert_eq!([held.lane(0), held.lane(1)], [None, Some(0)]);
+    let mut pass = held.pass();
+    pass.run_to(measured.samples(), &mut ()).unwrap();
+    let is_found = |i| held.log_likelihood(i, &pass.log_likelihood()).is_some();
+    assert_eq!([0, 1].map(is_found), [false, true]);
+    assert!(SideBySide::of(&[(&kalman, &CENTRE[..3])]).is_none());
     assert!(Score::forward(&kalman, &[f64::NAN; 4], &coordinates).is_err());
     assert!(Score::forward(&kalman, &[1.0], &coordinates).is_err());
     let saturated = Catalogue::default()
