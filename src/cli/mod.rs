@@ -44,6 +44,7 @@ use context::Context;
 use failure::{Failure, STOPPED};
 use std::error::Error;
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -127,7 +128,8 @@ fn in_pool<R: Send>(
     work: impl FnOnce() -> Result<R, Failure> + Send,
 ) -> Result<R, Failure> {
     let builder = rayon::ThreadPoolBuilder::new();
-    let failed = |threads, error| Failure::from(StorageError::threads(threads, error));
+    let failed =
+        |threads, error: &dyn Display| Failure::from(StorageError::threads(threads, error));
     let of_environment = std::env::var("RAYON_NUM_THREADS").ok();
     let asked = match threads {
         Some(threads) => Some(("--threads ", threads)),
@@ -146,13 +148,19 @@ fn in_pool<R: Send>(
             // An error without a cause says that the application has made the pool already.
             Err(error) if error.source().is_some() => {
                 let cores = std::thread::available_parallelism().map_or(1, usize::from);
-                Err(failed(cores, error))
+                Err(failed(cores, &error))
             }
             _ => work(),
         },
-        Some(threads) => (builder.num_threads(threads).build())
-            .map_err(|error| failed(threads, error))?
-            .install(work),
+        Some(threads) => {
+            // A thread that begins where memory ends takes the process with it: there must be 2 MiB for each stack, and as much beside it.
+            let mut room = Vec::<u8>::new();
+            (room.try_reserve_exact(threads << 22)).map_err(|error| failed(threads, &error))?;
+            drop(std::hint::black_box(room));
+            (builder.num_threads(threads).build())
+                .map_err(|error| failed(threads, &error))?
+                .install(work)
+        }
     }
 }
 
