@@ -160,6 +160,7 @@ impl Score {
         theta: &[f64],
         coordinates: &Coordinates,
     ) -> Result<Self, FilterError> {
+        kalman.check(theta)?;
         let phi = coordinates.of(theta);
         let mut thetas = vec![theta.to_vec()];
         let mut slopes = vec![];
