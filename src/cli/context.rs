@@ -21,11 +21,6 @@ pub(super) trait Verb {
         None
     }
 
-    /// Tells whether the verb ends with the answer so far when it is stopped.
-    fn has_partial_answer(&self) -> bool {
-        false
-    }
-
     /// Tells whether the ranks of a cluster share the work.
     fn is_shared_out(&self) -> bool {
         false

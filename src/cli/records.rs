@@ -71,7 +71,7 @@ fn warn_of_outlier(path: &Path, record: &Record) {
             warn(&format!(
                 "{}, row {}, column {}: {:?} is an outlier, 95 % of the column lie within ±{usual:?}; correct it if it is a mistake",
                 path.display(),
-                record.drive().lines().line(sample.unwrap_or_default()),
+                record.drive().rows().line(sample.unwrap_or_default()),
                 column_names(letter, signal.ncols())[j],
                 sample.map_or(largest, |k| channel[k]),
             ));

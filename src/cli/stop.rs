@@ -5,6 +5,7 @@ use super::failure::{Failure, STOPPED, say};
 use super::remedy::Cause;
 use super::shell_word;
 use crate::external::program::end_all;
+use crate::storage::files::result;
 use crate::storage::remove_unfinished;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -15,6 +16,8 @@ use std::time::Duration;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 static STOP: OnceLock<StoppedCall> = OnceLock::new();
+/// `true` where work that is stopped ends with what was found so far, which may take longer than a moment.
+static ENDS: AtomicBool = AtomicBool::new(false);
 
 /// Time that work has to come to its next step, or to write what it found. The documented limit is 2 s; half of it cuts more training
 /// steps off before they are kept.
@@ -26,13 +29,14 @@ struct StoppedCall {
     call: String,
     /// Folder of finished work that the same call resumes.
     kept: Option<PathBuf>,
-    /// `true` where the verb ends with what was found so far, which may take longer than a moment.
-    has_partial_answer: bool,
 }
 
 impl StoppedCall {
     fn text(&self) -> String {
         let resume = &self.call;
+        if let Some(result) = result() {
+            return format!("stopped; {} is complete", result.display());
+        }
         match &self.kept {
             Some(folder) if folder.exists() => {
                 let folder = folder.display();
@@ -48,7 +52,6 @@ pub(super) fn listen(verb: &dyn Verb, call: &[OsString]) {
     let _ = STOP.set(StoppedCall {
         call: shell_word::line(call.iter().map(OsString::as_os_str)),
         kept: verb.kept(),
-        has_partial_answer: verb.has_partial_answer(),
     });
     let asked = || {
         if ASKED.swap(true, Ordering::Relaxed) {
@@ -60,12 +63,17 @@ pub(super) fn listen(verb: &dyn Verb, call: &[OsString]) {
     let _ = ctrlc::set_handler(asked);
 }
 
+/// Lets the work of this call come to its end from here on: it stops by itself, with what it has found.
+pub(super) fn let_end() {
+    ENDS.store(true, Ordering::Relaxed);
+}
+
 /// Ends a process whose work does not come to its next step.
 fn leave() {
     thread::sleep(MOMENT);
     let Some(stop) = STOP.get() else { return };
-    if stop.has_partial_answer {
-        say("stopping: the answer so far follows; Ctrl-C again ends at once");
+    if ENDS.load(Ordering::Relaxed) {
+        say("stopping with what was found so far; Ctrl-C again ends at once");
         return;
     }
     say(&format!("error: {}", stop.text()));

@@ -89,7 +89,7 @@ pub(super) fn restarted(
         if fits[0].objective <= best + BUDGET.restart_gain {
             return Ok(true);
         }
-        *fits = polish(problem, std::mem::take(fits), ITERATIONS)?;
+        *fits = polish(problem, fits.clone(), ITERATIONS)?;
     }
     Ok(false)
 }

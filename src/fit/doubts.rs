@@ -19,7 +19,7 @@ pub(crate) const STILL_OUTPUT: &str = "constant-output";
 pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 20] = [
+const REMEDIES: [(&str, &str); 21] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",
@@ -53,6 +53,7 @@ const REMEDIES: [(&str, &str); 20] = [
         "inputs-between-samples",
         "declare in the study how inputs move between samples, if you know it",
     ),
+    ("interrupted", "fit again, and let it end"),
     (
         "leans-on-prior",
         "do not trust the prior, or refine always, for what the record says alone",
@@ -307,6 +308,14 @@ impl<'a> Doubts<'a> {
         let problem = self.problem;
         self.all
             .extend(Warning::still(&problem.twin.signals(), &problem.records));
+    }
+
+    /// Warns of a fit that was stopped behind its search.
+    pub fn interrupted(&mut self, is_cut: bool) {
+        if is_cut {
+            let what = "the fit was stopped before all was asked of the records: intervals are of first order, profiles and draws are left out";
+            self.warn("interrupted", what.into());
+        }
     }
 
     /// Warns of steps that are too long for the fitted twin; returns whether free runs diverge, and all that do by their step.

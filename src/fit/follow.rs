@@ -6,25 +6,24 @@ use super::problem::Problem;
 use crate::fit::budget::BUDGET;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::Level;
-use crate::likelihood::kalman::{FilterError, States, recoverable};
+use crate::likelihood::kalman::{FilterError, Filtered, Gaussian, recoverable};
 use crate::math::deviation;
 use crate::record::Signal;
 use crate::twin::{StepsTaken, begun};
 
 /// States at the first sample of each record, given the whole record.
-pub(crate) fn starts(problem: &Problem, smoothed: &[States]) -> Vec<FittedStart> {
+pub(crate) fn starts(problem: &Problem, first: &[Gaussian]) -> Vec<FittedStart> {
     let states = problem.outline().states;
-    (smoothed.iter().enumerate())
-        .flat_map(|(r, smoothed)| {
-            let deviations = smoothed.standard_deviations();
+    (first.iter().enumerate())
+        .flat_map(|(r, first)| {
             (states.iter().enumerate())
                 .filter(|(_, state)| !crate::twin::is_memory(&state.name))
                 .map(|(i, state)| FittedStart {
                     record: r + 1,
                     name: state.name.clone(),
                     unit: state.unit.clone(),
-                    value: smoothed.means[[0, i]],
-                    std_error: deviations[[0, i]],
+                    value: first.mean[i],
+                    std_error: first.deviation(i),
                 })
                 .collect::<Vec<_>>()
         })
@@ -39,14 +38,14 @@ pub(crate) fn starts(problem: &Problem, smoothed: &[States]) -> Vec<FittedStart>
 pub(crate) fn free_runs(
     problem: &Problem,
     theta: &[f64],
-    smoothed: &[States],
+    first: &[Gaussian],
 ) -> Result<Vec<Option<Signal>>, FilterError> {
     (problem.records.iter().enumerate())
         .map(|(r, record)| {
             let own = problem.of_record(r, theta);
-            let twin = match smoothed.get(r).map(States::first) {
+            let twin = match first.get(r).map(|first| &first.mean) {
                 Some(first) if first.iter().any(|x| !x.is_finite()) => return Ok(None),
-                Some(first) => begun(&problem.twin, &first, record.drive().dt())?,
+                Some(first) => begun(&problem.twin, first, record.drive().dt())?,
                 None => problem.twin.clone(),
             };
             match twin.free_run(&own, record.drive()) {
@@ -68,24 +67,20 @@ pub(super) fn steps_taken(problem: &Problem, theta: &[f64]) -> Option<StepsTaken
     })
 }
 
-/// Errors of each output that the records have at the full θ.
+/// Errors of each output that the records have, from innovations and free runs.
 pub(super) fn errors(
     problem: &Problem,
-    theta: &[f64],
+    filtered: &[Filtered],
     free_runs: &[Option<Signal>],
-) -> Result<Vec<OutputErrors>, FilterError> {
-    let filtered = problem.filtered(theta)?;
+) -> Vec<OutputErrors> {
     let outputs = problem.outline().outputs;
-    let rms = |values: &[f64]| {
-        (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
-    };
     // A record may lack a sensor.
     let there = |j: &usize| problem.records.iter().any(|record| record.has_output(*j));
-    Ok((0..outputs.len())
+    (0..outputs.len())
         .filter(there)
         .map(|j| {
             let output = &outputs[j];
-            let (mut one_step, mut free, mut all) = (vec![], vec![], vec![]);
+            let (mut one_step, mut free, mut all) = (Rms::default(), Rms::default(), vec![]);
             let mut correlation = LagOne::default();
             for (r, record) in problem.records.iter().enumerate() {
                 correlation.begin();
@@ -97,24 +92,42 @@ pub(super) fn errors(
                     all.push(y);
                     // The first row is predicted from the start, which a record is not to be judged by.
                     if k > 0 {
-                        one_step.push(filtered[r].innovations[[k, j]]);
+                        one_step.add(filtered[r].innovations[[k, j]]);
                         correlation.add(k, filtered[r].standardised[[k, j]]);
                     }
                     if let Some(run) = &free_runs[r] {
-                        free.push(y - run[[k, j]]);
+                        free.add(y - run[[k, j]]);
                     }
                 }
             }
             OutputErrors {
                 name: output.name.clone(),
                 unit: output.unit.clone(),
-                one_step: rms(&one_step),
+                one_step: one_step.value(),
                 correlation: correlation.value(),
-                free_run: free_runs.iter().all(Option::is_some).then(|| rms(&free)),
+                free_run: free_runs.iter().all(Option::is_some).then(|| free.value()),
                 deviation: deviation(&all),
             }
         })
-        .collect())
+        .collect()
+}
+
+/// Root mean square of values; 0 of none.
+#[derive(Default)]
+struct Rms {
+    squares: f64,
+    count: usize,
+}
+
+impl Rms {
+    fn add(&mut self, value: f64) {
+        self.squares += value * value;
+        self.count += 1;
+    }
+
+    fn value(&self) -> f64 {
+        (self.squares / self.count.max(1) as f64).sqrt()
+    }
 }
 
 /// Correlation of values with those a row before, over the present ones.
@@ -188,13 +201,14 @@ pub(super) fn swallowed(
     let Some(alone) = fit(&quiet, &starts, ITERATIONS)? else {
         return Ok(None);
     };
-    let Some(smoothed) = recoverable(quiet.smoothed(&alone.theta))? else {
+    let Some(first) = recoverable(quiet.first_states(&alone.theta))? else {
         return Ok(None);
     };
-    let runs = free_runs(&quiet, &alone.theta, &smoothed)?;
-    let Some(alone) = recoverable(errors(&quiet, &alone.theta, &runs))? else {
+    let runs = free_runs(&quiet, &alone.theta, &first)?;
+    let Some(filtered) = recoverable(quiet.filtered(&alone.theta))? else {
         return Ok(None);
     };
+    let alone = errors(&quiet, &filtered, &runs);
     let all = (fitted_errors.iter().zip(alone)).filter_map(|(own, alone)| {
         let (with, without) = (own.free_run?, alone.free_run?);
         let is_better = without.powi(2) < (1.0 - BUDGET.swallowed) * with.powi(2);

@@ -17,6 +17,9 @@ pub struct FitSettings {
     pub draws: usize,
     /// Profile likelihoods of all parameters; otherwise only of those whose posterior the prior shapes.
     pub profile: bool,
+    /// Where progress cancels the fit behind its search: give the answer without the stages that are left, marked as
+    /// [interrupted](Fit::interrupted), in place of an error.
+    pub give_partial: bool,
 }
 
 impl FitSettings {
@@ -33,6 +36,7 @@ impl Default for FitSettings {
             level: 0.9,
             draws: 0,
             profile: false,
+            give_partial: false,
         }
     }
 }
@@ -74,6 +78,9 @@ pub struct Fit {
     pub samples: usize,
     /// Wall time in seconds.
     pub seconds: f64,
+    /// `true` where progress cancelled the fit behind its search: what was not yet asked of the records stands as without, intervals may be of
+    /// first order.
+    pub interrupted: bool,
     /// Innovations of each record in their own units, N × outputs: independent N(0, 1) if the twin is right.
     #[serde(skip)]
     pub residuals: Vec<Signal>,

@@ -2,7 +2,9 @@
 
 use crate::fit::axis::{Axis, EvidencePrior, Family};
 use crate::fit::budget::Passes;
-use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Responses, Score, States};
+use crate::likelihood::kalman::{
+    Coordinates, FilterError, Filtered, Gaussian, Responses, Score, States,
+};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::math::LANES;
 use crate::record::{Record, Signal};
@@ -406,16 +408,19 @@ impl Problem {
             .collect()
     }
 
-    /// States of each record given all of it; empty for a black box.
-    pub fn smoothed(&self, theta: &[f64]) -> Result<Vec<States>, FilterError> {
+    /// The state at the first sample of each record given all of it; empty for a black box.
+    pub fn first_states(&self, theta: &[f64]) -> Result<Vec<Gaussian>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.counted()?.smoothed(&self.of_record(r, theta), record))
+            .map(|(r, record)| {
+                self.counted()?
+                    .first_state(&self.of_record(r, theta), record)
+            })
             .filter_map(Result::transpose)
             .collect()
     }
 
-    /// Process noise of each step of each record given all of it; empty for a black box.
-    pub fn disturbances(&self, theta: &[f64]) -> Result<Vec<Signal>, FilterError> {
+    /// Process noise of each step of each record and its states, given all of it; empty for a black box.
+    pub fn disturbances(&self, theta: &[f64]) -> Result<Vec<(Signal, States)>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| {
                 self.counted()?

@@ -11,9 +11,10 @@ use super::problem::Problem;
 use super::profile::{Profile, ProfilesOf, profiles};
 use super::searched::Searched;
 use super::starts::{agreed, agreeing, polish};
-use crate::fit::budget::{BUDGET, ITERATIONS};
+use crate::fit::budget::{BUDGET, ITERATIONS, Stages};
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, Measured};
+use crate::record::Signal;
 use crate::twin::{Noise, Role, Twin};
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -29,6 +30,7 @@ pub(crate) fn run(
     measured: &Measured,
     searched: Searched,
     (settings, which): (&FitSettings, ProfilesOf),
+    stages: &mut Stages,
 ) -> Result<Option<Fit>, FilterError> {
     let clock = Instant::now();
     let noise = settings.noise();
@@ -38,19 +40,26 @@ pub(crate) fn run(
         without,
         off,
     } = searched;
-    let arrived = restarted(&problem, &mut fits, noise.child("restarts"))?;
+    let restarts = noise.child("restarts");
+    let arrived = stages.of(false, || restarted(&problem, &mut fits, restarts))?;
     let levels = &measured.levels;
     let asked = (settings.draws > 0).then_some(settings.draws);
     let draws = match problem.is_simulated() && asked.is_none() {
         true => PosteriorSample::default(),
-        false => drawn(&problem, &mut fits, asked, noise)?,
+        false => stages.of(PosteriorSample::default(), || {
+            drawn(&problem, &mut fits, asked, noise)
+        })?,
     };
     let Some((fitted, certificate)) =
         (fits.first().cloned()).zip(Certificate::new(&problem, &fits))
     else {
         return Ok(None);
     };
-    let evidence = evidence(&problem, &fitted, &draws, noise.child("evidence"))?;
+    let evidence_by = |draws| evidence(&problem, &fitted, draws, noise.child("evidence"));
+    let evidence = match stages.of(None, || evidence_by(&draws).map(Some))? {
+        Some(evidence) => evidence,
+        None => evidence_by(&PosteriorSample::default())?,
+    };
     let spread = FitIntervals::new(&problem, &fitted, &draws.thetas, settings.level);
     let (mut parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
     let arrived = arrived && certificate.has_converged();
@@ -59,17 +68,29 @@ pub(crate) fn run(
         ProfilesOf::Shaped if !arrived => ProfilesOf::None,
         which => which,
     };
-    let profiled = profiles(&problem, &fitted, (which, settings.level))?;
+    let profiled = stages.of(<_>::default(), || {
+        profiles(&problem, &fitted, (which, settings.level))
+    })?;
     let profiles = stated(&problem, profiled, &mut parameters);
-    let smoothed = problem.smoothed(&fitted.theta)?;
-    let free_runs = free_runs(&problem, &fitted.theta, &smoothed)?;
-    let starts = starts(&problem, &smoothed);
+    let (starts, free_runs, errors, residuals) = stages.whole(|| {
+        let first = problem.first_states(&fitted.theta)?;
+        let free_runs = free_runs(&problem, &fitted.theta, &first)?;
+        let filtered = problem.filtered(&fitted.theta)?;
+        let errors = errors(&problem, &filtered, &free_runs);
+        let residuals: Vec<Signal> = (filtered.into_iter()).map(|f| f.standardised).collect();
+        Ok::<_, FilterError>((starts(&problem, &first), free_runs, errors, residuals))
+    })?;
+    let posterior = match asked {
+        Some(_) if draws.round.is_some() => stages.of(None, || {
+            table(&problem, &draws, noise.child("starts")).map(Some)
+        })?,
+        _ => None,
+    };
     let own = measured.twin.parameters().len() - levels.len();
     let start = |state: &str| {
         let start = starts.iter().find(|start| start.name == state)?;
         Some((start.value, start.std_error))
     };
-    let errors = errors(&problem, &fitted.theta, &free_runs)?;
     let mut convergence = Convergence {
         converged: arrived,
         distance: certificate.distance,
@@ -91,8 +112,9 @@ pub(crate) fn run(
     doubts.start(measured.elsewhere.as_ref());
     doubts.bounds(&parameters, &noise_levels, &off);
     doubts.runs(&errors, by_step);
-    doubts.swallowed(swallowed(&problem, &fitted, levels, &errors)?);
+    doubts.swallowed(stages.of(None, || swallowed(&problem, &fitted, levels, &errors))?);
     doubts.still();
+    doubts.interrupted(stages.are_cut());
     Ok(Some(Fit {
         parameters,
         noise: noise_levels,
@@ -109,17 +131,14 @@ pub(crate) fn run(
         convergence,
         errors,
         warnings: doubts.all,
-        posterior: (asked.is_some())
-            .then(|| table(&problem, &draws, noise.child("starts")))
-            .transpose()?,
+        interrupted: stages.are_cut(),
+        posterior,
         profiles,
         stepping: None,
         steps: steps_taken(&problem, &fitted.theta),
         samples: problem.samples(),
         seconds: clock.elapsed().as_secs_f64(),
-        residuals: (problem.filtered(&fitted.theta)?.into_iter())
-            .map(|filtered| filtered.standardised)
-            .collect(),
+        residuals,
         free_runs,
     }))
 }
@@ -159,7 +178,7 @@ fn drawn(
     }
     let best = fits.first().map(|fit| fit.objective);
     let more = noise.child("more searches");
-    *fits = agreed(problem, std::mem::take(fits), more, ITERATIONS)?;
+    *fits = agreed(problem, fits.clone(), more, ITERATIONS)?;
     match fits.first().map(|fit| fit.objective) > best {
         true => followed(problem, fits, asked, noise.child("posterior")),
         false => Ok(draws),

@@ -58,12 +58,12 @@ pub(crate) fn score(
     let Some(filtered) = recoverable(problem.filtered(&theta))? else {
         return Ok(None);
     };
-    let smoothed = problem.smoothed(&theta)?;
-    let mut runs = free_runs(&problem, &theta, &smoothed)?;
+    let first = problem.first_states(&theta)?;
+    let mut runs = free_runs(&problem, &theta, &first)?;
     let densities = &filtered[0].log_densities[1..];
     Ok(Some(FitScore {
         log_score: densities.iter().sum::<f64>() / densities.len().max(1) as f64,
-        errors: errors(&problem, &theta, &runs)?,
+        errors: errors(&problem, &filtered, &runs),
         free_run: runs.swap_remove(0),
     }))
 }

@@ -11,6 +11,7 @@ use crate::twin::Noise;
 use std::collections::BTreeMap;
 
 /// Ends of all searches.
+#[derive(Clone)]
 pub(crate) struct Searched {
     pub problem: Problem,
     /// Best first.

@@ -2,7 +2,7 @@
 
 use super::ensemble;
 use super::kalman::{
-    Coordinates, FilterError, FilterSettings, Filtered, Kalman, Responses, Score, States,
+    Coordinates, FilterError, FilterSettings, Filtered, Gaussian, Kalman, Responses, Score, States,
     recoverable,
 };
 use crate::record::{Record, Signal};
@@ -18,10 +18,14 @@ pub(crate) trait Likelihood: Send + Sync {
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError>;
     /// Innovations with the filtered states.
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError>;
-    /// States given the whole record; `None` where there are none.
-    fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<States>, FilterError>;
-    /// Process noise of each step given the whole record, in state units; `None` where there are no states.
-    fn disturbances(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError>;
+    /// The state at the first sample given the whole record; `None` where there are no states.
+    fn first_state(&self, theta: &[f64], record: &Record) -> Result<Option<Gaussian>, FilterError>;
+    /// Process noise of each step and states given the whole record, in state units; `None` where there are no states.
+    fn disturbances(
+        &self,
+        theta: &[f64],
+        record: &Record,
+    ) -> Result<Option<(Signal, States)>, FilterError>;
     /// Outputs predicted from the rows before, over missing rows as far ahead as these last; `None` where only free runs are known.
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError>;
     /// Responses of predictions to small additions; `None` without equations.
@@ -87,10 +91,14 @@ impl Likelihood for FilterLikelihood {
         let states = (filtered.states.take()).map_or_else(|| Signal::zeros((0, 0)), |s| s.means);
         Ok((filtered, states))
     }
-    fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<States>, FilterError> {
-        self.kalman(record, &self.1)?.smooth(theta).map(Some)
+    fn first_state(&self, theta: &[f64], record: &Record) -> Result<Option<Gaussian>, FilterError> {
+        self.kalman(record, &self.1)?.first_state(theta).map(Some)
     }
-    fn disturbances(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
+    fn disturbances(
+        &self,
+        theta: &[f64],
+        record: &Record,
+    ) -> Result<Option<(Signal, States)>, FilterError> {
         (self.kalman(record, &self.1)?.disturbances(theta)).map(Some)
     }
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
@@ -150,10 +158,10 @@ impl Likelihood for EnsembleLikelihood {
         let predicted = filtered.held_predictions(record.outputs());
         Ok((filtered, predicted))
     }
-    fn smoothed(&self, _: &[f64], _: &Record) -> Result<Option<States>, FilterError> {
+    fn first_state(&self, _: &[f64], _: &Record) -> Result<Option<Gaussian>, FilterError> {
         Ok(None)
     }
-    fn disturbances(&self, _: &[f64], _: &Record) -> Result<Option<Signal>, FilterError> {
+    fn disturbances(&self, _: &[f64], _: &Record) -> Result<Option<(Signal, States)>, FilterError> {
         Ok(None)
     }
     fn predicted(&self, _: &[f64], _: &Record) -> Result<Option<Signal>, FilterError> {

@@ -28,8 +28,8 @@ pub struct Drive {
     inputs: Signal,
     /// Times on the record's own clock, one a row, where steps vary.
     times: Option<Arc<[f64]>>,
-    /// Lines of the file that the rows were read from, for messages.
-    lines: FileLines,
+    /// The file that the rows were read from, for messages.
+    rows: FileRows,
 }
 
 impl Drive {
@@ -52,7 +52,7 @@ impl Drive {
             first_time: 0.0,
             inputs,
             times: None,
-            lines: FileLines::default(),
+            rows: FileRows::default(),
         })
     }
 
@@ -137,14 +137,14 @@ impl Drive {
         self
     }
 
-    /// The same drive, its rows in these lines of a file.
-    pub(crate) fn in_lines(self, lines: FileLines) -> Self {
-        Self { lines, ..self }
+    /// The same drive, its rows read from a file.
+    pub(crate) fn read_from(self, rows: FileRows) -> Self {
+        Self { rows, ..self }
     }
 
-    /// Lines of the file that the rows were read from.
-    pub(crate) fn lines(&self) -> &FileLines {
-        &self.lines
+    /// The file that the rows were read from.
+    pub(crate) fn rows(&self) -> &FileRows {
+        &self.rows
     }
 
     /// Checks that all steps are the same, as a twin needs it that is told one step.
@@ -163,7 +163,7 @@ impl Drive {
             first_time: self.first_time,
             inputs: self.inputs.slice(s![..rows, ..]).to_owned(),
             times: self.times.as_ref().map(|times| times[..rows].into()),
-            lines: self.lines.clone(),
+            rows: self.rows.clone(),
         }
     }
 
@@ -175,7 +175,7 @@ impl Drive {
         Ok(Self {
             times: self.times.clone(),
             first_time: self.first_time,
-            lines: self.lines.clone(),
+            rows: self.rows.clone(),
             ..Self::new(self.dt, inputs)?
         })
     }
@@ -369,27 +369,38 @@ pub(super) fn signal(channels: &[impl AsRef<[f64]>]) -> Result<Signal, RecordErr
     }))
 }
 
-/// Line of each sample in the file of its record, as an editor counts lines: the header is line 1, the first sample line 2, unless there
-/// are empty lines or cells of several lines.
+/// The file that the rows of a record were read from: line of each sample, as an editor counts lines, and whether times were stamps. The
+/// header is line 1, the first sample line 2, unless there are empty lines or cells of several lines.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct FileLines(Option<Arc<[(usize, usize)]>>);
+pub(crate) struct FileRows {
+    surplus: Option<Arc<[(usize, usize)]>>,
+    has_stamps: bool,
+}
 
-impl FileLines {
-    /// Lines of a file. From each sample that is named on, so many more lines stand before a sample than samples do.
-    pub(super) fn of(surplus: Vec<(usize, usize)>) -> Self {
-        Self((!surplus.is_empty()).then(|| surplus.into()))
+impl FileRows {
+    /// Rows of a file. From each sample that is named on, so many more lines stand before a sample than samples do.
+    pub(super) fn of(surplus: Vec<(usize, usize)>, has_stamps: bool) -> Self {
+        Self {
+            surplus: (!surplus.is_empty()).then(|| surplus.into()),
+            has_stamps,
+        }
+    }
+
+    /// Returns whether times were stamps, whose unit nobody can mistake.
+    pub fn has_stamps(&self) -> bool {
+        self.has_stamps
     }
 
     /// Returns the line of a sample.
     pub fn line(&self, sample: usize) -> usize {
-        let surplus = self.0.as_deref().unwrap_or_default();
+        let surplus = self.surplus.as_deref().unwrap_or_default();
         let after = surplus.partition_point(|(first, _)| *first <= sample);
         sample + 2 + surplus[..after].last().map_or(0, |(_, lines)| *lines)
     }
 }
 
-/// Where rows stand in a file is no part of what was measured.
-impl PartialEq for FileLines {
+/// How rows stand in a file is no part of what was measured.
+impl PartialEq for FileRows {
     fn eq(&self, _: &Self) -> bool {
         true
     }

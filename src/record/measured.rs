@@ -156,7 +156,7 @@ impl Record {
         let mut cells = self.outputs.indexed_iter();
         if let Some(((k, j), _)) = cells.find(|(_, v)| v.is_nan()) {
             return Err(RecordError::Incomplete {
-                row: self.drive.lines().line(k),
+                row: self.drive.rows().line(k),
                 column: column_names("y", self.outputs.ncols()).swap_remove(j),
             });
         }
@@ -168,7 +168,7 @@ impl Record {
         let farthest = (0..self.samples()).max_by(|a, b| off(a).total_cmp(&off(b)));
         let k = farthest.unwrap_or_default();
         Err(RecordError::Uneven {
-            row: drive.lines().line(k + 1),
+            row: drive.rows().line(k + 1),
             given: six_digits(drive.step(k)),
             expected: six_digits(drive.dt()),
         })

@@ -1,7 +1,7 @@
 //! The numbers of a record file, checked cell by cell.
 
 use super::channels::{Wanted, column_names, columns, is_usual};
-use super::drive::FileLines;
+use super::drive::FileRows;
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};
 use crate::record::{Drive, LARGEST, Record, RecordError, Signal};
@@ -21,7 +21,7 @@ pub(super) struct Table {
     times: Vec<f64>,
     inputs: Signal,
     outputs: Signal,
-    lines: FileLines,
+    rows: FileRows,
 }
 
 impl Table {
@@ -35,8 +35,8 @@ impl Table {
         }
         let inputs = self.inputs.ncols();
         match Drive::with_times(&self.times, self.inputs) {
-            Ok(drive) => Ok(drive.in_lines(self.lines)),
-            Err(error) => Err(in_file(error, path, &self.time, inputs, &self.lines)),
+            Ok(drive) => Ok(drive.read_from(self.rows)),
+            Err(error) => Err(in_file(error, path, &self.time, inputs, &self.rows)),
         }
     }
 
@@ -48,8 +48,8 @@ impl Table {
         }
         let inputs = self.inputs.ncols();
         (Drive::with_times(&self.times, self.inputs))
-            .and_then(|drive| Record::new(drive.in_lines(self.lines.clone()), self.outputs))
-            .map_err(|error| in_file(error, path, &self.time, inputs, &self.lines))
+            .and_then(|drive| Record::new(drive.read_from(self.rows.clone()), self.outputs))
+            .map_err(|error| in_file(error, path, &self.time, inputs, &self.rows))
     }
 
     /// Parses a table; `read` counts the numbers of this file and those before.
@@ -143,7 +143,7 @@ impl Table {
             times: t,
             inputs: signal(inputs, u)?,
             outputs: signal(outputs, y)?,
-            lines: FileLines::of(surplus),
+            rows: FileRows::of(surplus, parser.first.is_some()),
         })
     }
 }
@@ -154,17 +154,17 @@ fn in_file(
     path: &Path,
     time: &str,
     inputs: usize,
-    lines: &FileLines,
+    rows: &FileRows,
 ) -> RecordError {
     match error {
         RecordError::TimeOrder { sample, .. } => {
-            RecordError::cell(path, lines.line(sample), time, error.to_string())
+            RecordError::cell(path, rows.line(sample), time, error.to_string())
         }
         RecordError::ReplicateInputs {
             sample, channel, ..
         } => {
             let column = column_names("u", inputs).swap_remove(channel - 1);
-            RecordError::cell(path, lines.line(sample), &column, error.to_string())
+            RecordError::cell(path, rows.line(sample), &column, error.to_string())
         }
         RecordError::Step(step) => RecordError::file(
             path,

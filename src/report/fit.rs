@@ -30,6 +30,7 @@ use serde_json::{Value, json};
 /// | `posterior` | of posterior draws: names, how many independent ones they are worth, share and mean of each mode; null where none were asked for |
 /// | `steps` | of a twin with adaptive steps: samples, substeps, most of one sample, samples with implicit steps |
 /// | `samples`, `seconds` | size of the records, time that it took |
+/// | `interrupted` | stopped behind its search: what was left to ask of the records stands as without |
 pub(super) fn fit_json(study: &Study, fit: &Fit) -> Value {
     let mut value = json!({ "schema": "truetwin.fit/1", "twin": study.name() });
     if let (Some(all), Ok(Value::Object(own))) = (value.as_object_mut(), serde_json::to_value(fit))

@@ -5,8 +5,22 @@ pub(crate) use super::error::{folder, with_remedy};
 use super::names::places_beside;
 use super::unfinished::{Unfinished, file_beside};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use tempfile::NamedTempFile;
+
+/// First result of this process that is in its place.
+static RESULT: OnceLock<PathBuf> = OnceLock::new();
+
+/// The first result of this process that is in its place: work that is stopped afterwards has lost nothing.
+pub(crate) fn result() -> Option<&'static Path> {
+    RESULT.get().map(PathBuf::as_path)
+}
+
+/// Notes a result that is in its place.
+pub(super) fn note_result(place: &Path) {
+    let _ = RESULT.set(place.into());
+}
 
 /// Writes a new file.
 pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -22,7 +36,11 @@ pub(crate) fn write_result<E: From<StorageError>>(
 ) -> Result<(), E> {
     let is_free = |path: &Path| path.symlink_metadata().is_err();
     let written = write(place);
-    if written.is_ok() || is_free(place) {
+    if written.is_ok() {
+        note_result(place);
+        return written;
+    }
+    if is_free(place) {
         return written;
     }
     let kept = places_beside(place).find(|path| is_free(path) && write(path).is_ok());

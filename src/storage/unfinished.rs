@@ -7,6 +7,7 @@
 
 use super::StorageError;
 use super::error::folder;
+use super::files::note_result;
 use super::names::{is_unfinished, named, places_beside, prefix};
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
@@ -287,7 +288,12 @@ impl NewFolder {
             Ok(kept)
         });
         match kept.map_err(failed)? {
-            None => Ok(()),
+            None => {
+                if is_claimed {
+                    note_result(&place);
+                }
+                Ok(())
+            }
             Some(kept) => Err(StorageError::Kept { place, kept }),
         }
     }

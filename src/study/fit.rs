@@ -3,7 +3,8 @@
 use super::{Study, StudyError};
 use crate::effect::Effect;
 use crate::fit::{
-    Fit, FitScore, FitSettings, Passes, ProfilesOf, Subject, Warning, other_hold, run, score,
+    Fit, FitScore, FitSettings, Passes, ProfilesOf, Stages, Subject, Warning, other_hold, run,
+    score,
 };
 use crate::hypothesis::search::asked::with_asked_noise;
 use crate::hypothesis::search::effects::searched;
@@ -80,7 +81,7 @@ impl Study {
                 StudyError::Filter(FilterError::Diverged { .. }) => study.no_fit(records),
                 other => other,
             })?;
-        if elsewhere && !self.file.effect.is_empty() {
+        if elsewhere && !fit.interrupted && !self.file.effect.is_empty() {
             let trusting = study.trusting_starts();
             let again =
                 || (trusting.fit_once(asks, records, settings, &passes)).map(|(fit, _)| fit);
@@ -88,7 +89,9 @@ impl Study {
             (fit, _) = with_better_start(fit, log_z, again)?;
         }
         fit.seconds = clock.elapsed().as_secs_f64();
-        stage.tick()?;
+        if !fit.interrupted {
+            stage.tick()?;
+        }
         Ok(fit)
     }
 
@@ -102,28 +105,35 @@ impl Study {
     ) -> Result<(Fit, bool), StudyError> {
         let effects = self.added_effects()?;
         let noise = settings.noise();
-        let fitted = |twin: &Twin| -> Result<_, StudyError> {
+        let fitted = |twin: &Twin| -> Result<_, FilterError> {
             let measured = measured(twin, records, &self.beliefs())?;
             let searched = searched(&measured, &effects, records.into(), noise, passes)?;
             Ok((measured, searched))
         };
         let (mut measured, mut searched) = fitted(&self.twin)?;
-        let other = match searched.fits.first() {
-            Some(best) if self.asks_hold() => other_hold(&searched.problem, best)?,
+        let mut stages = Stages::new(passes, settings.give_partial);
+        let mut other = match searched.fits.first() {
+            Some(best) if self.asks_hold() => {
+                stages.of(None, || other_hold(&searched.problem, best))?
+            }
             _ => None,
         };
         if let Some(twin) = other.and_then(|other| self.with_steps(other.stepping)) {
-            (measured, searched) = fitted(&twin)?;
+            match stages.of(None, || fitted(&twin).map(Some))? {
+                Some(again) => (measured, searched) = again,
+                None => other = None,
+            }
         }
         if asks {
-            searched = with_asked_noise(&measured, searched, noise)?;
+            let constant = searched.clone();
+            searched = stages.of(constant, || with_asked_noise(&measured, searched, noise))?;
         }
         let which = match (asks, settings.profile) {
             (_, true) => ProfilesOf::All,
             (true, false) => ProfilesOf::Shaped,
             (false, false) => ProfilesOf::None,
         };
-        let fitted = run(&measured, searched, (settings, which))?;
+        let fitted = run(&measured, searched, (settings, which), &mut stages)?;
         let mut fit = fitted.ok_or_else(|| self.no_fit(records))?;
         fit.stepping = other.map(|other| other.stepping);
         (fit.warnings).extend(other.map(|other| Warning::hold(other.stepping, Some(other.gain))));
@@ -224,8 +234,11 @@ impl Study {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::{DiagnoseSettings, diagnose};
+    use crate::diagnose::{DiagnoseSettings, diagnose, fixture};
+    use crate::progress::Listener;
     use crate::study::StudyFile;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// A study of 61 samples, and a record of it at θ that is made with adaptive steps.
     fn recorded(tables: &str, step: f64, theta: &[f64]) -> (Study, [Record; 1]) {
@@ -240,6 +253,58 @@ mod tests {
         let noise = Noise::new(1, "measured", 0);
         let outputs = adaptive.twin().simulate(theta, &drive, noise);
         (fixed, [Record::new(drive, outputs.unwrap()).unwrap()])
+    }
+
+    /// Says stop once it has been asked so many times.
+    struct Patience {
+        asked: AtomicUsize,
+        most: usize,
+    }
+
+    impl Listener for Patience {
+        fn advanced(&self, _: &str, _: u64, _: u64) {}
+        fn cancelled(&self) -> bool {
+            self.asked.fetch_add(1, Ordering::Relaxed) >= self.most
+        }
+    }
+
+    /// Behind the search, a fit that is stopped gives its answer where that is wanted; nothing else does.
+    #[test]
+    fn a_fit_that_is_stopped_behind_its_search_gives_its_answer() {
+        let study = fixture::tanks(120);
+        let twin = study.twin();
+        let records = [fixture::record(
+            &study,
+            twin,
+            &twin.parameters().centre(),
+            1,
+        )];
+        let fitted = |most: usize, give_partial: bool| {
+            let patience = Arc::new(Patience {
+                asked: AtomicUsize::new(0),
+                most,
+            });
+            let settings = FitSettings {
+                give_partial,
+                draws: 200,
+                ..FitSettings::default()
+            };
+            let fit = study.fit_with(&records, &settings, &Progress::new(patience.clone()));
+            (fit, patience.asked.load(Ordering::Relaxed))
+        };
+        let (whole, all) = fitted(usize::MAX, true);
+        let whole = whole.unwrap();
+        assert!(!whole.interrupted && whole.posterior.is_some());
+        let is_stopped =
+            |fit: Result<Fit, StudyError>| matches!(fit, Err(StudyError::Cancelled(_)));
+        assert!(is_stopped(fitted(3, true).0));
+        assert!(is_stopped(fitted(all - 3, false).0));
+        let part = fitted(all - 3, true).0.unwrap();
+        assert!(part.interrupted && part.posterior.is_none());
+        assert!(part.warnings.iter().any(|w| w.code == "interrupted"));
+        for (part, whole) in part.parameters.iter().zip(&whole.parameters) {
+            assert!((part.value - whole.value).abs() < 0.5 * whole.std_error);
+        }
     }
 
     /// The step is told as the reason, whether a fit goes wrong or ends; what diverges by it alone is not told as the twin's fault.

@@ -2,6 +2,7 @@
 
 use crate::cli::failure::STOPPED;
 use crate::cli::prelude::*;
+use crate::cli::stop;
 use crate::diagnose::{DiagnoseSettings, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
@@ -51,10 +52,6 @@ pub(in crate::cli) struct Diagnose {
 }
 
 impl Verb for Diagnose {
-    fn has_partial_answer(&self) -> bool {
-        true
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let folder = output::asked_folder(&self.out)?;
         let study = context.study(&self.subject)?;
@@ -65,6 +62,7 @@ impl Verb for Diagnose {
         let initial = (self.estimator.as_ref())
             .map(|path| first_estimate(context, &study, path, &records[0]))
             .transpose()?;
+        stop::let_end();
         let settings = DiagnoseSettings {
             seed: context.seed,
             calibrate: self.calibrate,

@@ -1,7 +1,9 @@
 //! `fit`: finds the most probable parameters of a twin, given records.
 
+use crate::cli::failure::STOPPED;
 use crate::cli::posterior::{self, PosteriorDraws};
 use crate::cli::prelude::*;
+use crate::cli::stop;
 use crate::fit::FitSettings;
 use crate::report::{Report, overlay_svg};
 
@@ -38,8 +40,10 @@ impl Verb for Fit {
             seed: context.seed,
             draws: self.draws.count()?,
             profile: self.profile,
+            give_partial: true,
             ..FitSettings::default()
         };
+        stop::let_end();
         let fit = study.fit_with(&records, &settings, context.progress)?;
         let provenance = Provenance::new(context).files("record", &self.records);
         let json = provenance.on(fit.json(&study));
@@ -63,8 +67,12 @@ impl Verb for Fit {
             }
             Ok(folder.finish()?)
         };
-        deliver(write, || {
+        let done = deliver(write, || {
             provenance.print(context, &json, || fit.text(&study))
+        })?;
+        Ok(match fit.interrupted {
+            true => ExitCode::from(STOPPED),
+            false => done,
         })
     }
 }

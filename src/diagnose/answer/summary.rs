@@ -181,7 +181,7 @@ pub(in crate::diagnose) fn nuisance(
         begun.extend(all);
         return Ok(begun);
     }
-    let begun = recoverable(model.problem.smoothed(&model.fitted.theta))?.unwrap_or_default();
+    let begun = recoverable(model.problem.first_states(&model.fitted.theta))?.unwrap_or_default();
     all.extend(
         starts(&model.problem, &begun)
             .into_iter()

@@ -161,12 +161,13 @@ fn courses(
     places: &[NoisyPlace],
 ) -> Result<Vec<Course>, FilterError> {
     let problem = problem.on(records);
-    let (steps, states) = (problem.disturbances(theta)?, problem.smoothed(theta)?);
+    let all = problem.disturbances(theta)?;
     let at = |place: &NoisyPlace, r: usize, k: usize| {
-        let memories = place.memories.iter().map(|&i| states[r].means[[k, i]]);
+        let (steps, states) = &all[r];
+        let memories = place.memories.iter().map(|&i| states.means[[k, i]]);
         let memory: f64 = memories.sum();
         match place.entry {
-            Entry::State(i) => steps[r][[k + 1, i]] / records[r].drive().step(k) + memory,
+            Entry::State(i) => steps[[k + 1, i]] / records[r].drive().step(k) + memory,
             _ => memory,
         }
     };

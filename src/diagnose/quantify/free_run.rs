@@ -3,7 +3,7 @@
 use crate::diagnose::outcome::FreeRuns;
 use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::problem::Problem;
-use crate::likelihood::kalman::{FilterError, States, recoverable};
+use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::median;
 use crate::record::{Record, Signal};
 use crate::study::StudyError;
@@ -20,11 +20,11 @@ pub(in crate::diagnose) struct Runner {
 impl Runner {
     /// The twin of a problem at θ, begun as a record shows; `None` where its first state cannot be told.
     pub fn new(problem: &Problem, theta: &[f64]) -> Result<Option<Self>, StudyError> {
-        let twin = match recoverable(problem.smoothed(theta))? {
+        let twin = match recoverable(problem.first_states(theta))? {
             None => return Ok(None),
-            Some(smoothed) => match smoothed.first().map(States::first) {
+            Some(first) => match first.first().map(|first| &first.mean) {
                 Some(first) if first.iter().any(|x| !x.is_finite()) => return Ok(None),
-                Some(first) => begun(&problem.twin, &first, problem.records[0].drive().dt())
+                Some(first) => begun(&problem.twin, first, problem.records[0].drive().dt())
                     .map_err(FilterError::from)?,
                 None => problem.twin.clone(),
             },

@@ -30,36 +30,37 @@ impl Expansion<'_> {
             .clamp(BUDGET.least_evidence_draws, BUDGET.most_evidence_draws);
         let log_prior = |phi: &DVector<f64>| self.log_prior(&phi.select_rows(&self.free), blocks);
         let mut source = noise.source("evidence");
-        let mut logs = self.reweighed(sample, blocks);
-        let mut found = mean_weight(&logs);
+        let mut draws = self.reweighed(sample, blocks);
+        let mut found = mean_weight(&draws);
         for _ in 0..BUDGET.evidence_rounds {
             if found.is_some_and(|(_, error, _)| error <= BUDGET.evidence_error) {
                 break;
             }
             let round = Round::new(self.problem, &proposals, count, &mut source, log_prior)?;
             proposals = round.adapted(&first, BUDGET.kept_covariance);
-            logs.extend(round.logs);
-            found = mean_weight(&logs);
+            draws.extend(round.logs.into_iter().zip(round.normals));
+            found = mean_weight(&draws);
         }
         let bounds = self.beyond_bounds(&self.problem.prior_terms().collect::<Vec<_>>());
         Ok(found.map(|(log, error, effective)| (log + bounds, error, effective)))
     }
 
-    /// log of likelihood·prior/proposal at the draws of the posterior, whose likelihoods are known; none where entries at a bound were drawn,
-    /// too.
-    fn reweighed(&self, sample: &PosteriorSample, blocks: &[SizePrior]) -> Vec<f64> {
+    /// log of likelihood·prior/proposal at the draws of the posterior, whose likelihoods are known, each with its normal over the proposal; none
+    /// where entries at a bound were drawn, too.
+    fn reweighed(&self, sample: &PosteriorSample, blocks: &[SizePrior]) -> Vec<(f64, f64)> {
         let Some(round) = sample.round.as_ref().filter(|r| r.free == self.free) else {
             return vec![];
         };
-        let draws = round.draws.iter().zip(&round.logs);
+        let draws = round.draws.iter().zip(&round.logs).zip(&round.normals);
         draws
-            .map(|(phi, log)| {
+            .map(|((phi, log), normal)| {
                 if *log == f64::NEG_INFINITY {
-                    return *log;
+                    return (*log, *normal);
                 }
                 let theta = self.problem.coordinates.theta(phi.as_slice());
                 let weak = self.problem.log_prior(&theta, true);
-                log - weak + self.log_prior(&phi.select_rows(&self.free), blocks)
+                let own = self.log_prior(&phi.select_rows(&self.free), blocks);
+                (log - weak + own, *normal)
             })
             .collect()
     }
@@ -104,15 +105,79 @@ impl Expansion<'_> {
     }
 }
 
-/// log of the mean weight, its standard error, and the effective number of draws; `None` where no draw has any weight.
-fn mean_weight(logs: &[f64]) -> Option<(f64, f64, f64)> {
-    let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+/// log of the mean weight, its standard error, and the effective number of draws; `None` where no draw has any weight. Draws are logs of
+/// weights, each with a control variate whose mean is 1: of a posterior that is nearly normal, weights are nearly in proportion to that.
+///
+/// ```text
+/// Z = mean w − β·(mean c − 1),   β = cov(w, c)/var c
+/// ```
+///
+/// Source: Owen, *Monte Carlo theory, methods and examples* (2013), section 8.9.
+fn mean_weight(draws: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
+    let top = (draws.iter()).fold(f64::NEG_INFINITY, |top, (log, _)| top.max(*log));
     if !top.is_finite() {
         return None;
     }
-    let weights: Vec<f64> = logs.iter().map(|l| (l - top).exp()).collect();
+    let weights: Vec<f64> = draws.iter().map(|(log, _)| (log - top).exp()).collect();
     let n = weights.len() as f64;
     let mean = weights.iter().sum::<f64>() / n;
-    let error = deviation(&weights) / n.sqrt() / mean;
+    let control = draws.iter().map(|(_, c)| c).sum::<f64>() / n;
+    let (mut both, mut square) = (0.0, 0.0);
+    for (weight, (_, c)) in weights.iter().zip(draws) {
+        both += (weight - mean) * (c - control);
+        square += (c - control).powi(2);
+    }
+    let slope = if square > 0.0 { both / square } else { 0.0 };
+    let rest: Vec<f64> = (weights.iter().zip(draws))
+        .map(|(weight, (_, c))| weight - slope * (c - 1.0))
+        .collect();
+    let held = rest.iter().sum::<f64>() / n;
+    // Few draws, of which the control tells more than there is.
+    let (mean, rest) = if held > 0.0 {
+        (held, &rest)
+    } else {
+        (mean, &weights)
+    };
+    let error = deviation(rest) / n.sqrt() / mean;
     Some((top + mean.ln(), error, effective(&weights)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Over 400 sets of 100 draws, the error that is told is that which they have, and a nearly normal target has a third of it, or less, of
+    /// that without the control.
+    #[test]
+    fn a_control_takes_off_what_a_normal_explains() {
+        // Under a Student of five degrees, the weight of a normal of variance 1.1, and that of Gumbel's density.
+        let mut source = Noise::new(3, "control", 0).source("z");
+        let student = |x: f64| -3.0 * (x * x / 5.0).ln_1p() + 0.379_606_7f64.ln();
+        let normal = |x: f64, v: f64| -0.5 * x * x / v - 0.5 * (TAU * v).ln();
+        let skewed = |x: f64| -x - (-x).exp();
+        for (target, gain) in [
+            (&(|x| normal(x, 1.1)) as &dyn Fn(f64) -> f64, 3.0),
+            (&skewed, 1.0),
+        ] {
+            let (mut found, mut told, mut plain) = (vec![], vec![], vec![]);
+            for _ in 0..400 {
+                let draws: Vec<(f64, f64)> = (0..100)
+                    .map(|_| {
+                        let square: f64 = (0..5).map(|_| source.normal().powi(2)).sum();
+                        let x = source.normal() * (5.0 / square).sqrt();
+                        (target(x) - student(x), (normal(x, 1.0) - student(x)).exp())
+                    })
+                    .collect();
+                let (log, error, _) = mean_weight(&draws).unwrap();
+                let bare: Vec<(f64, f64)> = draws.iter().map(|(log, _)| (*log, 1.0)).collect();
+                found.push(log);
+                told.push(error);
+                plain.push(mean_weight(&bare).unwrap().0);
+            }
+            let told = told.iter().sum::<f64>() / 400.0;
+            let (own, bare) = (deviation(&found), deviation(&plain));
+            assert!((0.8..1.25).contains(&(own / told)), "{own} {told}");
+            assert!(own * gain < bare * 1.1, "{own} {bare}");
+        }
+    }
 }

@@ -33,8 +33,9 @@ pub(in crate::fit) fn usual(problem: &Problem) -> usize {
 /// `count` draws of θ, or as many as fits need, from the posterior of likelihood and weak priors within the bounds; `fits` are ends of
 /// searches, best first.
 ///
-/// Draws of Student densities about the tops are weighed by posterior over their mixture; the weighted mean and covariance about each top
-/// propose a second round, as directions that the records hardly know bend; draws are taken from that in proportion to their weights.
+/// Draws of Student densities about the tops are weighed by posterior over their mixture. Unless weights are even already, the weighted mean and
+/// covariance about each top propose a second round, as directions that the records hardly know bend; draws are taken from that in proportion
+/// to their weights.
 ///
 /// Source: Rubin, "Using the SIR algorithm to simulate posterior distributions" (1988).
 pub(crate) fn posterior(
@@ -56,12 +57,14 @@ pub(crate) fn posterior(
     }
     let c = &problem.coordinates;
     let log_prior = |phi: &DVector<f64>| problem.log_prior(&c.theta(phi.as_slice()), true);
-    let (rounds, size) = match count {
-        Some(count) => (BUDGET.adaptations, usual.max(BUDGET.draws_each * count)),
-        None => (1, usual),
-    };
     let mut proposals = first.clone();
     let mut round = Round::new(problem, &proposals, usual, &mut source, log_prior)?;
+    let is_even = round.effective() >= BUDGET.even_weights * usual as f64;
+    let (rounds, size) = match count {
+        Some(count) => (BUDGET.adaptations, usual.max(BUDGET.draws_each * count)),
+        None if is_even => (0, usual),
+        None => (1, usual),
+    };
     let mut better = (best.objective + BUDGET.better_draw, None);
     let mut look = |round: &Round| {
         if let Some((phi, value)) = round.best()

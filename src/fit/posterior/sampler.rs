@@ -4,12 +4,13 @@
 
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
+use crate::fit::evidence::log_mean;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Source;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// Degrees of freedom of a proposal: heavier tails than a posterior's.
 const FREEDOM: usize = 5;
@@ -24,8 +25,9 @@ pub(in crate::fit) struct Proposal {
     /// Covariance of the posterior that it stands for, among the entries that may move.
     pub covariance: DMatrix<f64>,
     root: DMatrix<f64>,
-    /// log of the density at the centre.
+    /// log of the density at the centre, and that of the normal with this covariance.
     log_peak: f64,
+    normal_peak: f64,
 }
 
 impl Proposal {
@@ -52,6 +54,7 @@ impl Proposal {
                 - gamma(0.5 * nu)
                 - 0.5 * d * (nu * PI).ln()
                 - log_determinant,
+            normal_peak: -0.5 * d * TAU.ln() - log_determinant,
             free,
             centre,
             covariance,
@@ -85,12 +88,17 @@ impl Proposal {
         phi
     }
 
-    fn log_density(&self, phi: &DVector<f64>) -> f64 {
+    /// log of the density, and that of the normal with the same covariance.
+    fn log_densities(&self, phi: &DVector<f64>) -> (f64, f64) {
         let off = (phi - &self.centre).select_rows(&self.free);
         let (nu, d) = (FREEDOM as f64, self.free.len() as f64);
         match self.root.solve_lower_triangular(&off) {
-            Some(z) => self.log_peak - 0.5 * (nu + d) * (z.norm_squared() / nu).ln_1p(),
-            None => f64::NEG_INFINITY,
+            Some(z) => {
+                let square = z.norm_squared();
+                let own = self.log_peak - 0.5 * (nu + d) * (square / nu).ln_1p();
+                (own, self.normal_peak - 0.5 * square)
+            }
+            None => (f64::NEG_INFINITY, f64::NEG_INFINITY),
         }
     }
 }
@@ -105,6 +113,8 @@ pub(in crate::fit) struct Round {
     pub targets: Vec<f64>,
     /// log of target over proposal.
     pub logs: Vec<f64>,
+    /// Normals in place of the Student densities, over these: their mean is known to be 1.
+    pub normals: Vec<f64>,
     /// Target over proposal, over the largest.
     weights: Vec<f64>,
     /// Entries that may move.
@@ -120,9 +130,12 @@ impl Round {
         source: &mut Source,
         log_prior: impl Fn(&DVector<f64>) -> f64,
     ) -> Result<Self, FilterError> {
-        let draws: Vec<DVector<f64>> = (0..count)
-            .map(|i| proposals[i % proposals.len()].draw(source))
-            .collect();
+        let draws = (0..count)
+            .map(|i| {
+                heard(problem, i)?;
+                Ok(proposals[i % proposals.len()].draw(source))
+            })
+            .collect::<Result<Vec<DVector<f64>>, FilterError>>()?;
         let c = &problem.coordinates;
         let mut targets: Vec<f64> = (draws.iter())
             .map(|phi| match c.clamp(phi) == *phi {
@@ -140,24 +153,26 @@ impl Round {
         for (&i, value) in possible.iter().zip(problem.log_likelihoods(&thetas)?) {
             targets[i] += value.unwrap_or(f64::NEG_INFINITY);
         }
-        let of_proposals: Vec<(usize, f64)> = (draws.par_iter())
-            .map(|phi| {
-                let densities: Vec<f64> = proposals.iter().map(|q| q.log_density(phi)).collect();
+        let of_proposals = (draws.par_iter().enumerate())
+            .map(|(i, phi)| {
+                heard(problem, i)?;
+                let (densities, normals): (Vec<f64>, Vec<f64>) =
+                    proposals.iter().map(|q| q.log_densities(phi)).unzip();
                 let mode = (0..densities.len())
                     .max_by(|&a, &b| densities[a].total_cmp(&densities[b]))
                     .unwrap_or(0);
-                let top = densities[mode];
-                let sum: f64 = densities.iter().map(|d| (d - top).exp()).sum();
-                (mode, top + (sum / densities.len() as f64).ln())
+                let mixture = log_mean(&densities);
+                Ok((mode, mixture, (log_mean(&normals) - mixture).exp()))
             })
-            .collect();
+            .collect::<Result<Vec<(usize, f64, f64)>, FilterError>>()?;
         let logs: Vec<f64> = (targets.iter().zip(&of_proposals))
-            .map(|(target, (_, mixture))| target - mixture)
+            .map(|(target, (_, mixture, _))| target - mixture)
             .collect();
         let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Ok(Self {
             draws,
-            modes: of_proposals.iter().map(|(mode, _)| *mode).collect(),
+            modes: of_proposals.iter().map(|(mode, ..)| *mode).collect(),
+            normals: of_proposals.iter().map(|(.., normal)| *normal).collect(),
             targets,
             weights: logs.iter().map(|log| (log - top).exp()).collect(),
             logs,
@@ -232,6 +247,14 @@ impl Round {
     }
 }
 
+/// Fails once the work is to stop; asked at one draw of many, as each is quick and there may be millions.
+fn heard(problem: &Problem, draw: usize) -> Result<(), FilterError> {
+    if draw.is_multiple_of(1024) {
+        problem.passes().count(0)?;
+    }
+    Ok(())
+}
+
 /// Weights to the largest power up to 1 at which `least` draws count; `None` where none is enough.
 fn flattened(weights: Vec<f64>, least: f64) -> Option<Vec<f64>> {
     let power = |p: f64| -> Vec<f64> { weights.iter().map(|w| w.powf(p)).collect() };
@@ -275,6 +298,7 @@ mod tests {
             modes: vec![0; weights.len()],
             targets: weights.iter().map(|w| w.ln()).collect(),
             logs: weights.iter().map(|w| w.ln()).collect(),
+            normals: vec![1.0; weights.len()],
             weights,
             free: vec![0],
         };
@@ -307,7 +331,14 @@ mod tests {
             "{variance}"
         );
         let other = Proposal::new(vec![0, 2], centre, 0.5 * covariance).unwrap();
-        let ratio = |phi| (other.log_density(phi) - proposal.log_density(phi)).exp();
+        let (own, normal) = (
+            |q: &Proposal, phi| q.log_densities(phi).0,
+            |phi| proposal.log_densities(phi).1,
+        );
+        let ratio = |phi| (own(&other, phi) - own(&proposal, phi)).exp();
+        let mean = draws.iter().map(ratio).sum::<f64>() / n;
+        assert!((mean - 1.0).abs() < 0.02, "{mean}");
+        let ratio = |phi| (normal(phi) - own(&proposal, phi)).exp();
         let mean = draws.iter().map(ratio).sum::<f64>() / n;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
         let part = proposal

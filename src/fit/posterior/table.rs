@@ -2,11 +2,10 @@
 
 use super::resampling::PosteriorSample;
 use crate::fit::problem::{Problem, of_record};
-use crate::likelihood::kalman::{FilterError, States};
-use crate::math::to_matrix;
+use crate::likelihood::kalman::{FilterError, Gaussian};
 use crate::twin::{Noise, Role, is_memory};
-use nalgebra::DVector;
-use ndarray::{Array2, s};
+use nalgebra::{DMatrix, DVector};
+use ndarray::Array2;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -87,8 +86,8 @@ pub(in crate::fit) fn table(
             let mut row: Vec<f64> = own.iter().map(|&j| theta[j]).collect();
             if !states.is_empty() {
                 let noise = noise.sample(i as u64);
-                for (r, smoothed) in problem.smoothed(theta)?.iter().enumerate() {
-                    let start = drawn(smoothed, noise.child(&format!("record {r}")));
+                for (r, first) in problem.first_states(theta)?.iter().enumerate() {
+                    let start = drawn(first, noise.child(&format!("record {r}")));
                     row.extend(states.iter().map(|&i| start[i]));
                 }
             }
@@ -105,9 +104,10 @@ pub(in crate::fit) fn table(
 }
 
 /// A first state, given the record.
-fn drawn(smoothed: &States, noise: Noise) -> Vec<f64> {
-    let mean = DVector::from_vec(smoothed.first());
-    let covariance = to_matrix(&smoothed.covariances.slice(s![0, .., ..]));
+fn drawn(first: &Gaussian, noise: Noise) -> Vec<f64> {
+    let n = first.mean.len();
+    let mean = DVector::from_column_slice(&first.mean);
+    let covariance = DMatrix::from_row_slice(n, n, &first.cov);
     let mut source = noise.source("start");
     let z = DVector::from_fn(mean.len(), |_, _| source.normal());
     // A state that is known has no variance: no root by Cholesky.

@@ -14,6 +14,7 @@ use crate::fit::climb::{Fitted, climb};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 /// Starts of a search.
@@ -189,25 +190,67 @@ fn is_apart(problem: &Problem, one: &[f64], other: &[f64]) -> bool {
         })
 }
 
-/// Searches from all starts, best first; those of long records go over their [`sketch`] first.
+/// Searches from all starts, best first.
 pub(super) fn climbs(
     problem: &Problem,
     starts: &[Vec<f64>],
     iterations: usize,
 ) -> Result<Vec<Fitted>, FilterError> {
-    let sketch = sketch(problem);
-    let search = |start: &Vec<f64>| {
-        let found = match &sketch {
-            Some(sketch) => climb(sketch, start, iterations)?.map(|fit| fit.theta),
-            None => None,
-        };
-        climb(problem, found.as_ref().unwrap_or(start), iterations)
-    };
-    let mut fits: Vec<Fitted> = (starts.par_iter())
-        .filter_map(|start| search(start).transpose())
-        .collect::<Result<_, _>>()?;
+    let ends = ends(problem, starts, iterations)?;
+    let mut fits: Vec<Fitted> = ends.into_iter().flatten().collect();
     sort(&mut fits);
     Ok(fits)
+}
+
+/// The end of the search from each start. Those of long records go over their [`sketch`] first; from a top there, one way leads on.
+fn ends(
+    problem: &Problem,
+    starts: &[Vec<f64>],
+    iterations: usize,
+) -> Result<Vec<Option<Fitted>>, FilterError> {
+    let begun = match sketch(problem) {
+        Some(sketch) => ends(&sketch, starts, iterations)?,
+        None => vec![None; starts.len()],
+    };
+    let all: Vec<(Option<Fitted>, &Vec<f64>)> = begun.into_iter().zip(starts).collect();
+    let is_same = |(one, _): &(Option<Fitted>, _), (other, _): &(Option<Fitted>, _)| {
+        one.as_ref()
+            .zip(other.as_ref())
+            .is_some_and(|(one, other)| is_one_top(problem, one, other))
+    };
+    once_each(&all, is_same, |(begun, start)| {
+        let from = begun.as_ref().map_or(*start, |fit| &fit.theta);
+        climb(problem, from, iterations)
+    })
+}
+
+/// Returns whether two searches have found the same top at the same place.
+fn is_one_top(problem: &Problem, one: &Fitted, other: &Fitted) -> bool {
+    let c = &problem.coordinates;
+    let off = DVector::from_vec(c.of(&one.theta)) - DVector::from_vec(c.of(&other.theta));
+    (one.objective - other.objective).abs() <= BUDGET.same_top
+        && off.dot(&(&other.information * &off)) <= 1.0
+}
+
+/// Does work once for all items that are the same, on all cores; returns what it finds for each item.
+fn once_each<T: Sync, R: Clone + Send>(
+    items: &[T],
+    is_same: impl Fn(&T, &T) -> bool,
+    work: impl Fn(&T) -> Result<R, FilterError> + Sync,
+) -> Result<Vec<R>, FilterError> {
+    let mut firsts: Vec<&T> = vec![];
+    let of: Vec<usize> = (items.iter())
+        .map(|item| {
+            let known = firsts.iter().position(|first| is_same(item, first));
+            known.unwrap_or_else(|| {
+                firsts.push(item);
+                firsts.len() - 1
+            })
+        })
+        .collect();
+    let found = firsts.into_par_iter().map(&work);
+    let found = found.collect::<Result<Vec<R>, FilterError>>()?;
+    Ok(of.into_iter().map(|i| found[i].clone()).collect())
 }
 
 /// Number of fits, best first, that end at the best top.
@@ -226,14 +269,13 @@ pub(crate) fn polish(
 ) -> Result<Vec<Fitted>, FilterError> {
     let precise = problem.until(BUDGET.polished_gain);
     let best = fits.first().map_or(f64::NAN, |fit| fit.objective);
-    let mut fits: Vec<Fitted> = (fits.into_par_iter())
-        .map(|fit| {
-            if best - fit.objective > BUDGET.near {
-                return Ok(fit);
-            }
-            Ok(climb(&precise, &fit.theta, iterations)?.unwrap_or(fit))
-        })
-        .collect::<Result<_, FilterError>>()?;
+    let is_same = |one: &Fitted, other: &Fitted| one.theta == other.theta;
+    let mut fits = once_each(&fits, is_same, |fit| {
+        if best - fit.objective > BUDGET.near {
+            return Ok(fit.clone());
+        }
+        Ok(climb(&precise, &fit.theta, iterations)?.unwrap_or_else(|| fit.clone()))
+    })?;
     sort(&mut fits);
     Ok(fits)
 }

@@ -111,11 +111,6 @@ impl States {
         }
     }
 
-    /// Means at the first sample.
-    pub(crate) fn first(&self) -> Vec<f64> {
-        self.means.row(0).to_vec()
-    }
-
     /// Standard deviations (N × n), in state units.
     pub fn standard_deviations(&self) -> Signal {
         Signal::from_shape_fn(self.means.dim(), |(k, i)| {

@@ -10,31 +10,36 @@ const ABSOLUTE_PIVOT: f64 = 1e-28;
 
 /// Mean (n) and covariance (n × n, row-major, both triangles).
 #[derive(Debug, Clone)]
-pub(super) struct Gaussian {
+pub(crate) struct Gaussian {
     pub mean: Vec<f64>,
     pub cov: Vec<f64>,
 }
 
 impl Gaussian {
-    pub fn zero(n: usize) -> Self {
+    pub(super) fn zero(n: usize) -> Self {
         Self {
             mean: vec![0.0; n],
             cov: vec![0.0; n * n],
         }
     }
 
-    pub fn of(belief: Belief<'_>) -> Self {
+    pub(super) fn of(belief: Belief<'_>) -> Self {
         Self {
             mean: belief.mean.to_vec(),
             cov: belief.cov.to_vec(),
         }
     }
 
-    pub fn as_belief(&self) -> Belief<'_> {
+    pub(super) fn as_belief(&self) -> Belief<'_> {
         Belief {
             mean: &self.mean,
             cov: &self.cov,
         }
+    }
+
+    /// Standard deviation of an entry.
+    pub fn deviation(&self, i: usize) -> f64 {
+        self.cov[i * self.mean.len() + i].max(0.0).sqrt()
     }
 }
 

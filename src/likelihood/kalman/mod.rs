@@ -67,6 +67,7 @@ pub use error::FilterError;
 pub(crate) use error::recoverable;
 pub use filter::Kalman;
 pub use filtered::{Filtered, States};
+pub(crate) use gaussian::Gaussian;
 pub(crate) use score::Responses;
 pub use score::Score;
 pub use settings::{FilterSettings, Method};

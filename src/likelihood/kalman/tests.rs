@@ -162,6 +162,16 @@ fn agrees_with_the_exact_filter(twin: &Chain, record: &Record) {
             let smoothed = Kalman::new(twin.clone(), record, &settings)
                 .and_then(|k| k.smooth(&theta))
                 .unwrap();
+            let first = Kalman::new(twin.clone(), record, &settings)
+                .and_then(|k| k.first_state(&theta))
+                .unwrap();
+            let (mean, covariance) = &expected.smoothed[0];
+            for i in 0..2 {
+                assert!((first.mean[i] - mean[i]).abs() < 1e-8);
+                for j in 0..2 {
+                    assert!((first.cov[2 * i + j] - covariance[(i, j)]).abs() < 1e-8);
+                }
+            }
             for (states, expected) in [
                 (found.states.unwrap(), &expected.filtered),
                 (smoothed, &expected.smoothed),

@@ -189,8 +189,8 @@ pub(super) fn distances(
     let n = twin.outline().states.len();
     let mut all = vec![0.0; n];
     for record in records {
-        let smoothed = Kalman::new(twin, record, &settings)?.smooth(theta);
-        let Some(smoothed) = recoverable(smoothed)? else {
+        let first = Kalman::new(twin, record, &settings)?.first_state(theta);
+        let Some(first) = recoverable(first)? else {
             return Ok(None);
         };
         let mut start = vec![0.0; n];
@@ -199,8 +199,8 @@ pub(super) fn distances(
         };
         twin.run_to_first_row(&acting, &mut twin.workspace(), &mut start);
         for (i, distance) in all.iter_mut().enumerate() {
-            let off = smoothed.means[[0, i]] - start[i];
-            let beyond = off * off - smoothed.covariances[[0, i, i]];
+            let off = first.mean[i] - start[i];
+            let beyond = off * off - first.cov[i * n + i];
             if beyond.is_finite() {
                 *distance = f64::max(*distance, beyond.max(0.0).sqrt());
             }

@@ -79,7 +79,7 @@ pub(super) fn check(
         if outliers.len() > 2 * usual {
             let largest = outliers.iter().map(|(_, z)| *z).fold(0.0, f64::max);
             let named: Vec<String> = (outliers.iter().take(LIMITS.named))
-                .map(|(at, _)| record.drive().lines().line(rows[*at]).to_string())
+                .map(|(at, _)| record.drive().rows().line(rows[*at]).to_string())
                 .collect();
             let more = if outliers.len() > LIMITS.named {
                 ", …"

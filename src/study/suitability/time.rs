@@ -34,6 +34,7 @@ pub(super) fn check(
     };
     let like_plan = |unit: f64| (step / unit / plan).ln().abs() <= near.ln();
     if !constants.is_some_and(fits)
+        && !drive.rows().has_stamps()
         && let Some((unit, name)) = UNITS.into_iter().find(|(unit, _)| like_plan(*unit))
     {
         let message = format!(
@@ -97,7 +98,7 @@ pub(super) fn in_seconds(record: Record, unit: f64) -> Result<Record, RecordErro
     let times: Vec<f64> = (0..record.samples())
         .map(|k| drive.own_time(k) / unit)
         .collect();
-    let lines = drive.lines().clone();
-    let drive = Drive::with_times(&times, drive.inputs().clone())?.in_lines(lines);
+    let rows = drive.rows().clone();
+    let drive = Drive::with_times(&times, drive.inputs().clone())?.read_from(rows);
     Record::new(drive, record.outputs().clone())
 }

@@ -296,6 +296,25 @@ fn a_record_is_checked_against_a_twin() {
     refused(&["check", &record], &["no twin given"]);
 }
 
+/// Steps that are far from the study's are told as another unit of time, but not of time stamps, which have none.
+#[test]
+fn the_unit_of_time_stamps_is_not_doubted() {
+    let place = Place::new();
+    let stamped = |row: &Vec<String>| {
+        let t = (1e3 * row[0].parse::<f64>().unwrap()).round() as u64;
+        let (day, hour, rest) = (1 + t / 86_400, t / 3600 % 24, t % 3600);
+        let (minute, second) = (rest / 60, rest % 60);
+        format!(
+            "2024-01-{day:02}T{hour:02}:{minute:02}:{second:02}Z,{},{}\n",
+            row[1], row[2]
+        )
+    };
+    let rows: String = place.rows().iter().take(40).map(stamped).collect();
+    let record = place.write("stamped.csv", format!("t,u,y\n{rows}"));
+    let text = done(&["check", &record, "--twin", "tanks"]);
+    assert!(!text.contains("seems to be in"), "{text}");
+}
+
 /// Lines that hold no sample count: a row of a message is the line of an editor.
 #[test]
 fn rows_are_counted_as_an_editor_counts_lines() {
