@@ -105,6 +105,10 @@ numbers! {
         most_evidence_draws: usize = 1000,
         /// Monte-Carlo error of the evidence in nats that is small enough.
         evidence_error: f64 = 0.03,
+        /// Draws for each control variate that is used, at least: with half, the error that is told is a tenth too small.
+        draws_a_control: usize = 10,
+        /// Draws from which none are used: their error is small enough, and each control is a number a draw.
+        controlled_draws: usize = 20_000,
         /// Rounds for which more draws are taken, at most.
         evidence_rounds: usize = 4,
         /// Effective draws below which these say less of the evidence than Laplace.

@@ -63,6 +63,9 @@ numbers! {
         /// Nats from which another kind of noise becomes that of a fit: 20 to 1. With half of it, one record in a hundred of constant noise gets one
         /// that grows; with twice as many, a share of 5 % is missed where the signal moves by less than itself.
         asked_noise: f64 = 3.0,
+        /// Nats that a score must promise of such a kind for it to be fitted at all: a third of the above, as the likelihood is not quadratic. With
+        /// half, one record in five of constant noise pays for the fit; with twice, shares go unseen that are just worth it.
+        noise_promise: f64 = 1.0,
         /// Functions that are refitted, of those of one or two variables: what they promise says little of what a refit gains. With 5, the mean
         /// logarithm of the probability of the truth is −1.75 on open trials, with 12 −1.34, in 1.35 times the time.
         functions: usize = 12,

@@ -15,6 +15,9 @@ use std::f64::consts::{PI, TAU};
 /// Degrees of freedom of a proposal: heavier tails than a posterior's.
 const FREEDOM: usize = 5;
 
+/// Highest degree of the polynomials that control variates are made of.
+const DEGREES: usize = 4;
+
 /// A Student density about one top, in the entries of φ that may move.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Proposal {
@@ -88,17 +91,39 @@ impl Proposal {
         phi
     }
 
-    /// log of the density, and that of the normal with the same covariance.
-    fn log_densities(&self, phi: &DVector<f64>) -> (f64, f64) {
-        let off = (phi - &self.centre).select_rows(&self.free);
+    fn log_density(&self, phi: &DVector<f64>) -> f64 {
         let (nu, d) = (FREEDOM as f64, self.free.len() as f64);
-        match self.root.solve_lower_triangular(&off) {
-            Some(z) => {
-                let square = z.norm_squared();
-                let own = self.log_peak - 0.5 * (nu + d) * (square / nu).ln_1p();
-                (own, self.normal_peak - 0.5 * square)
+        match self.standardised(phi) {
+            Some(z) => self.log_peak - 0.5 * (nu + d) * (z.norm_squared() / nu).ln_1p(),
+            None => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Entries that may move, in standard deviations from the centre.
+    fn standardised(&self, phi: &DVector<f64>) -> Option<DVector<f64>> {
+        let off = (phi - &self.centre).select_rows(&self.free);
+        self.root.solve_lower_triangular(&off)
+    }
+
+    /// Adds `weight` times the normal that this density stands for, and the same times Hermite polynomials of degree 1 to 4 along each axis, all of
+    /// unit variance under that normal.
+    fn add_controls(&self, phi: &DVector<f64>, log_weight: f64, to: &mut [f64]) {
+        let Some(z) = self.standardised(phi) else {
+            return;
+        };
+        let normal = (self.normal_peak - 0.5 * z.norm_squared() + log_weight).exp();
+        let (first, others) = to.split_at_mut(1);
+        first[0] += normal;
+        let polynomials: [fn(f64) -> f64; DEGREES] = [
+            |z| z,
+            |z| (z * z - 1.0) / 2f64.sqrt(),
+            |z| (z * z - 3.0) * z / 6f64.sqrt(),
+            |z| ((z * z - 6.0) * z * z + 3.0) / 24f64.sqrt(),
+        ];
+        for (row, polynomial) in others.chunks_exact_mut(z.len()).zip(polynomials) {
+            for (to, z) in row.iter_mut().zip(z.iter()) {
+                *to += normal * polynomial(*z);
             }
-            None => (f64::NEG_INFINITY, f64::NEG_INFINITY),
         }
     }
 }
@@ -113,8 +138,9 @@ pub(in crate::fit) struct Round {
     pub targets: Vec<f64>,
     /// log of target over proposal.
     pub logs: Vec<f64>,
-    /// Normals in place of the Student densities, over these: their mean is known to be 1.
-    pub normals: Vec<f64>,
+    /// log of the proposals' mixture at each draw.
+    mixtures: Vec<f64>,
+    proposals: Vec<Proposal>,
     /// Target over proposal, over the largest.
     weights: Vec<f64>,
     /// Entries that may move.
@@ -156,23 +182,22 @@ impl Round {
         let of_proposals = (draws.par_iter().enumerate())
             .map(|(i, phi)| {
                 heard(problem, i)?;
-                let (densities, normals): (Vec<f64>, Vec<f64>) =
-                    proposals.iter().map(|q| q.log_densities(phi)).unzip();
+                let densities: Vec<f64> = proposals.iter().map(|q| q.log_density(phi)).collect();
                 let mode = (0..densities.len())
                     .max_by(|&a, &b| densities[a].total_cmp(&densities[b]))
                     .unwrap_or(0);
-                let mixture = log_mean(&densities);
-                Ok((mode, mixture, (log_mean(&normals) - mixture).exp()))
+                Ok((mode, log_mean(&densities)))
             })
-            .collect::<Result<Vec<(usize, f64, f64)>, FilterError>>()?;
+            .collect::<Result<Vec<(usize, f64)>, FilterError>>()?;
         let logs: Vec<f64> = (targets.iter().zip(&of_proposals))
-            .map(|(target, (_, mixture, _))| target - mixture)
+            .map(|(target, (_, mixture))| target - mixture)
             .collect();
         let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Ok(Self {
             draws,
-            modes: of_proposals.iter().map(|(mode, ..)| *mode).collect(),
-            normals: of_proposals.iter().map(|(.., normal)| *normal).collect(),
+            modes: of_proposals.iter().map(|(mode, _)| *mode).collect(),
+            mixtures: of_proposals.iter().map(|(_, mixture)| *mixture).collect(),
+            proposals: proposals.to_vec(),
             targets,
             weights: logs.iter().map(|log| (log - top).exp()).collect(),
             logs,
@@ -180,11 +205,51 @@ impl Round {
         })
     }
 
+    /// Draws of one proposal in one entry, weighed by a target.
+    #[cfg(test)]
+    pub fn of_target(
+        proposal: &Proposal,
+        count: usize,
+        source: &mut Source,
+        target: &dyn Fn(f64) -> f64,
+    ) -> Self {
+        let draws: Vec<DVector<f64>> = (0..count).map(|_| proposal.draw(source)).collect();
+        let targets: Vec<f64> = draws.iter().map(|phi| target(phi[0])).collect();
+        let mixtures: Vec<f64> = draws.iter().map(|phi| proposal.log_density(phi)).collect();
+        let logs = targets.iter().zip(&mixtures).map(|(t, q)| t - q).collect();
+        Self {
+            modes: vec![0; count],
+            weights: vec![1.0; count],
+            free: proposal.free.clone(),
+            proposals: vec![proposal.clone()],
+            draws,
+            targets,
+            logs,
+            mixtures,
+        }
+    }
+
     /// Draw with the largest target, and its log.
     pub fn best(&self) -> Option<(&DVector<f64>, f64)> {
         let best =
             (0..self.targets.len()).max_by(|&a, &b| self.targets[a].total_cmp(&self.targets[b]))?;
         Some((&self.draws[best], self.targets[best]))
+    }
+
+    /// Control variates of a draw: mean 0 over draws of the proposals, whatever the target is. Of a target that is nearly normal, weights are nearly
+    /// in proportion to the first; the others are what an Edgeworth series adds.
+    ///
+    /// ```text
+    /// N/q − 1,   N/q·He_m(z_j)          N: mean of the normals that the proposals stand for;  q: their own mean
+    /// ```
+    pub fn controls(&self, draw: usize) -> Vec<f64> {
+        let log_weight = -self.mixtures[draw] - (self.proposals.len() as f64).ln();
+        let mut controls = vec![0.0; 1 + DEGREES * self.free.len()];
+        for proposal in &self.proposals {
+            proposal.add_controls(&self.draws[draw], log_weight, &mut controls);
+        }
+        controls[0] -= 1.0;
+        controls
     }
 
     /// (Σw)²/Σw².
@@ -298,7 +363,8 @@ mod tests {
             modes: vec![0; weights.len()],
             targets: weights.iter().map(|w| w.ln()).collect(),
             logs: weights.iter().map(|w| w.ln()).collect(),
-            normals: vec![1.0; weights.len()],
+            mixtures: vec![0.0; weights.len()],
+            proposals: vec![],
             weights,
             free: vec![0],
         };
@@ -331,16 +397,18 @@ mod tests {
             "{variance}"
         );
         let other = Proposal::new(vec![0, 2], centre, 0.5 * covariance).unwrap();
-        let (own, normal) = (
-            |q: &Proposal, phi| q.log_densities(phi).0,
-            |phi| proposal.log_densities(phi).1,
+        let ratio = |phi| (other.log_density(phi) - proposal.log_density(phi)).exp();
+        let mean = draws.iter().map(ratio).sum::<f64>() / n;
+        assert!((mean - 1.0).abs() < 0.02, "{mean}");
+        let mut controls = vec![0.0; 1 + 2 * DEGREES];
+        for phi in &draws {
+            proposal.add_controls(phi, -proposal.log_density(phi), &mut controls);
+        }
+        controls[0] -= n;
+        assert!(
+            controls.iter().all(|c| (c / n).abs() < 0.03),
+            "{controls:?}"
         );
-        let ratio = |phi| (own(&other, phi) - own(&proposal, phi)).exp();
-        let mean = draws.iter().map(ratio).sum::<f64>() / n;
-        assert!((mean - 1.0).abs() < 0.02, "{mean}");
-        let ratio = |phi| (normal(phi) - own(&proposal, phi)).exp();
-        let mean = draws.iter().map(ratio).sum::<f64>() / n;
-        assert!((mean - 1.0).abs() < 0.02, "{mean}");
         let part = proposal
             .within(&[2], &DVector::from_vec(vec![9.0, 7.0, 5.0]))
             .unwrap();
