@@ -2,7 +2,9 @@
 
 use super::failure::Failure;
 use super::output;
+use crate::math::{six_digits, three_digits};
 use crate::record::{Record, RecordReader, column_names};
+use crate::setting::number;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -69,11 +71,12 @@ fn warn_of_outlier(path: &Path, record: &Record) {
             }
             let sample = channel.iter().position(|value| value.abs() == largest);
             warn(&format!(
-                "{}, row {}, column {}: {:?} is an outlier, 95 % of the column lie within ±{usual:?}; correct it if it is a mistake",
+                "{}, row {}, column {}: {} is an outlier, 95 % of the column lie within ±{}; correct it if it is a mistake",
                 path.display(),
                 record.drive().rows().line(sample.unwrap_or_default()),
                 column_names(letter, signal.ncols())[j],
-                sample.map_or(largest, |k| channel[k]),
+                number(six_digits(sample.map_or(largest, |k| channel[k]))),
+                number(three_digits(usual)),
             ));
         }
     }

@@ -39,7 +39,17 @@ pub(super) trait Remedy {
     }
 }
 
-impl Remedy for SimulationError {}
+impl Remedy for SimulationError {
+    fn remedy(&self) -> Option<String> {
+        matches!(self, Self::Diverged { .. }).then(|| {
+            "a state, an output or a level of noise is no finite number there: other values of --theta or of an effect, [record] substeps or integrator of the study file".into()
+        })
+    }
+
+    fn cause(&self) -> Cause {
+        Cause::Study
+    }
+}
 
 /// Remedies of findings about a record.
 impl Remedy for Finding {

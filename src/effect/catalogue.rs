@@ -135,6 +135,12 @@ struct EffectFile {
     effect: Vec<toml::Spanned<toml::Value>>,
 }
 
+#[derive(Deserialize)]
+struct EffectEntries {
+    #[expect(dead_code, reason = "read for the place of what is wrong")]
+    effect: Vec<EffectEntry>,
+}
+
 impl Catalogue {
     /// Reads effects from the text of a file.
     ///
@@ -171,12 +177,22 @@ impl Catalogue {
         };
         let file: EffectFile = toml::from_str(text)
             .map_err(|error| at(error.span().map_or(0, |span| span.start), error.message()))?;
+        if file.effect.is_empty() {
+            return Err(at(
+                0,
+                "no effect; add a table [[effect]] with id and target",
+            ));
+        }
         (file.effect.into_iter())
             .map(|table| {
                 // Each effect for itself: an error inside then points at its own [[effect]].
                 let start = table.span().start;
-                let entry = EffectEntry::deserialize(table.into_inner())
-                    .map_err(|error| at(start, error.message()))?;
+                let entry = EffectEntry::deserialize(table.into_inner()).map_err(|error| {
+                    // A table on its own has lost the places of its values.
+                    let whole = toml::from_str::<EffectEntries>(text).err();
+                    let value = whole.and_then(|error| error.span());
+                    at(value.map_or(start, |value| value.start), error.message())
+                })?;
                 self.resolve(&entry)
                     .map_err(|error| at(start, &error.to_string()))
             })
@@ -210,6 +226,15 @@ mod tests {
         let told = error.to_string();
         assert!(
             told.contains("expected a table with id and target"),
+            "{told}"
+        );
+        let first = "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n";
+        let text = format!("{first}{first}error = 'x'\n");
+        let told = Catalogue::default().parse(&text).unwrap_err().to_string();
+        assert!(told.contains("line 7"), "{told}");
+        let told = Catalogue::default().parse("# none\n").unwrap_err();
+        assert!(
+            told.to_string().contains("no effect; add a table"),
             "{told}"
         );
     }

@@ -115,5 +115,22 @@ fn check_given(effect: &Effect) -> Result<(), TwinError> {
         };
         return Err(refused(effect, name, &problem));
     }
-    Ok(())
+    check_range(effect)
+}
+
+/// Checks that the ends of a range, which are off at −∞ and at ∞, are in order where both are given.
+fn check_range(effect: &Effect) -> Result<(), TwinError> {
+    let end = |off: f64| {
+        let mut ends = effect.magnitudes().iter().filter(|m| m.off == Some(off));
+        let name = ends.next()?.name;
+        Some((name, *effect.all_given().get(name)?))
+    };
+    match end(f64::NEG_INFINITY).zip(end(f64::INFINITY)) {
+        Some(((low, below), (high, above))) if below > above => {
+            let (below, above) = (number(below), number(above));
+            let problem = format!(": {low} = {below} is above {high} = {above}; swap them");
+            Err(refused(effect, low, &problem))
+        }
+        _ => Ok(()),
+    }
 }

@@ -253,6 +253,8 @@ pub(super) enum Wanted<'a> {
     Record(&'a Columns, Option<&'a Signals>),
     /// The time, and the input that has the first of these names in the file; none where there are no names.
     Input(&'a [&'a str]),
+    /// Those of a record of any twin: `u…` are inputs, `y…` outputs, in the order of the file.
+    ByLetter,
 }
 
 impl Wanted<'_> {
@@ -260,7 +262,7 @@ impl Wanted<'_> {
     pub fn is_usual(self) -> bool {
         match self {
             Self::Record(columns, _) => columns.is_empty(),
-            Self::Input(_) => true,
+            Self::Input(_) | Self::ByLetter => true,
         }
     }
 
@@ -277,6 +279,7 @@ impl Wanted<'_> {
         let names = match self {
             Self::Record(columns, signals) => return columns.usual_names(header, signals),
             Self::Input(names) => names,
+            Self::ByLetter => return by_letter(header),
         };
         let input = match names.first() {
             Some(name) => Some(input_column(header, names, name)?),
@@ -289,6 +292,32 @@ impl Wanted<'_> {
         };
         Ok(header.iter().enumerate().map(usual).collect())
     }
+}
+
+/// The usual name of each column by its first letter, in the order of the file; other columns as they are.
+fn by_letter(header: &[&str]) -> Result<Vec<Option<String>>, String> {
+    let count = |letter: char| {
+        let own = header
+            .iter()
+            .filter(|c| is_usual(c) && c.starts_with(letter));
+        own.count()
+    };
+    let [mut inputs, mut outputs] = [("u", 'u'), ("y", 'y')]
+        .map(|(name, letter)| column_names(name, count(letter)).into_iter());
+    (header.iter().enumerate())
+        .map(|(at, column)| {
+            if header[..at].contains(column) {
+                let column = quoted(column);
+                return Err(format!("column \"{column}\" appears twice; remove one"));
+            }
+            let usual = match column.chars().next().filter(|_| is_usual(column)) {
+                Some('u') => inputs.next(),
+                Some('y') => outputs.next(),
+                _ => None,
+            };
+            Ok(Some(usual.unwrap_or_else(|| (*column).to_owned())))
+        })
+        .collect()
 }
 
 /// Index of the column of an input: the first of `names` that a column has, or the only column that is neither time nor output.

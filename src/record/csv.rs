@@ -92,6 +92,20 @@ impl RecordReader {
         Ok(record)
     }
 
+    /// Reads a measured record of which no twin is known, and the names of its columns: time, inputs, outputs. Without names of columns, the
+    /// first letters tell which is which; `y0,y1` and `y1,y3` are two outputs each.
+    pub(crate) fn named(&mut self, path: &Path) -> Result<(Record, Vec<String>), RecordError> {
+        if !self.columns.is_empty() {
+            let record = self.record(path)?;
+            let (inputs, outputs) = (record.drive().inputs(), record.outputs());
+            let names = columns(inputs.ncols(), outputs.ncols());
+            return Ok((record, names));
+        }
+        let table = table(path, Wanted::ByLetter, &mut self.read)?;
+        let names = table.names().to_vec();
+        Ok((table.record(path)?, names))
+    }
+
     /// Reads time and inputs; columns of outputs are refused.
     pub fn drive(&mut self, path: &Path) -> Result<Drive, RecordError> {
         let columns = self.columns.without_outputs(self.signals.as_ref());
@@ -178,6 +192,12 @@ impl Record {
     pub fn write(&self, path: &Path) -> Result<(), RecordError> {
         write_new(path, record_csv_text(self).as_bytes())
             .map_err(|error| RecordError::io(path, error))
+    }
+
+    /// As [`write`](Self::write), with names of the columns: time, inputs, outputs.
+    pub(crate) fn write_named(&self, path: &Path, names: &[String]) -> Result<(), RecordError> {
+        let text = csv_text(names, self.drive(), self.outputs());
+        write_new(path, text.as_bytes()).map_err(|error| RecordError::io(path, error))
     }
 
     /// As [`write`](Self::write), for a twin with these channels: its reader tells them apart.

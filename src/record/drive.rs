@@ -99,11 +99,7 @@ impl Drive {
             steps.push(step);
         }
         if steps.is_empty() {
-            return Err(RecordError::TimeOrder {
-                sample: 1,
-                time: times[1],
-                before: times[0],
-            });
+            return Err(RecordError::OneTime(times[0]));
         }
         let (first, last) = (times[0], times[times.len() - 1]);
         let dt = (last - first) / steps.len() as f64;
@@ -444,13 +440,14 @@ mod tests {
         assert!(drive.with_inputs(Signal::ones((5, 1))).is_err());
         for times in [
             [0.0, 1.0, 0.5],
-            [1.0, 1.0, 1.0],
             [0.0, f64::NAN, 2.0],
             [0.0, 1.0, f64::INFINITY],
         ] {
             let error = Drive::with_times(&times, Signal::zeros((3, 0))).unwrap_err();
             assert!(error.to_string().contains("time must increase"), "{error}");
         }
+        let error = Drive::with_times(&[1.0; 3], Signal::zeros((3, 0))).unwrap_err();
+        assert!(error.to_string().contains("at least two times"), "{error}");
     }
 
     /// Rows of one time are readings of one state, on which no other input acts.

@@ -19,6 +19,9 @@ pub enum RecordError {
     /// Times, inputs, outputs or their channels of different lengths.
     #[error("{0}; both need the same number")]
     Lengths(String),
+    /// Rows that all have one time.
+    #[error("all rows have the time {} s; rows of one time are readings of one state: give at least two times", number(*.0))]
+    OneTime(f64),
     /// A time that does not follow the one before it.
     #[error(
         "{} s follows {} s; time must increase: sort the rows, or give them their times",

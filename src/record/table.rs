@@ -16,8 +16,8 @@ const MOST_COLUMNS: usize = 2001;
 
 /// The numbers of a file.
 pub(super) struct Table {
-    /// Name of the column of times.
-    time: String,
+    /// Names of the columns of time, inputs and outputs; an output without a column has none.
+    names: Vec<String>,
     times: Vec<f64>,
     inputs: Signal,
     outputs: Signal,
@@ -25,6 +25,11 @@ pub(super) struct Table {
 }
 
 impl Table {
+    /// Names of the columns: time, inputs, outputs.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
     /// The table as time and inputs alone.
     pub fn drive(self, path: &Path) -> Result<Drive, RecordError> {
         if self.outputs.ncols() > 0 {
@@ -36,7 +41,7 @@ impl Table {
         let inputs = self.inputs.ncols();
         match Drive::with_times(&self.times, self.inputs) {
             Ok(drive) => Ok(drive.read_from(self.rows)),
-            Err(error) => Err(in_file(error, path, &self.time, inputs, &self.rows)),
+            Err(error) => Err(in_file(error, path, &self.names[0], inputs, &self.rows)),
         }
     }
 
@@ -49,7 +54,7 @@ impl Table {
         let inputs = self.inputs.ncols();
         (Drive::with_times(&self.times, self.inputs))
             .and_then(|drive| Record::new(drive.read_from(self.rows.clone()), self.outputs))
-            .map_err(|error| in_file(error, path, &self.time, inputs, &self.rows))
+            .map_err(|error| in_file(error, path, &self.names[0], inputs, &self.rows))
     }
 
     /// Parses a table; `read` counts the numbers of this file and those before.
@@ -94,7 +99,12 @@ impl Table {
         let places: Vec<Option<usize>> = (usual.iter())
             .map(|name| name.as_ref().map(|name| place(name, inputs)))
             .collect();
-        let time = (places.iter().position(|place| *place == Some(0))).map_or("t", |j| header[j]);
+        let mut names = vec![String::new(); width];
+        for (place, name) in places.iter().zip(&header) {
+            if let Some(place) = *place {
+                names[place] = (*name).into();
+            }
+        }
         // Numbers alone are kept, and each once: a record may fill half of the memory.
         let (mut t, mut u, mut y) = (Vec::new(), Vec::new(), Vec::new());
         // An output without a column is missing.
@@ -139,7 +149,7 @@ impl Table {
                 .map_err(|error| RecordError::file(path, error))
         };
         Ok(Self {
-            time: time.into(),
+            names,
             times: t,
             inputs: signal(inputs, u)?,
             outputs: signal(outputs, y)?,

@@ -19,7 +19,7 @@ pub(crate) fn sha256_of(path: &Path) -> io::Result<String> {
 }
 
 /// The SHA-256 of bytes that come in pieces.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Hashing(Sha256);
 
 impl Hashing {

@@ -43,7 +43,8 @@ impl InputPlan {
             Self::Levels { hold: 0, .. } => {
                 Err("hold = 0; a level is held for at least 1 sample".into())
             }
-            Self::Levels { levels, .. } if levels.low() > levels.high() || !is_finite(*levels) => {
+            // Of numbers of 1e308, the width is none.
+            Self::Levels { levels, .. } if levels.low() > levels.high() || !levels.is_finite() => {
                 Err(wrong_ends(&[levels.low(), levels.high()]))
             }
             Self::Constant(value) if !value.is_finite() => {
@@ -52,10 +53,6 @@ impl InputPlan {
             _ => Ok(()),
         }
     }
-}
-
-fn is_finite(levels: Interval) -> bool {
-    levels.low().is_finite() && levels.high().is_finite()
 }
 
 /// Inputs of simulated records.

@@ -4,7 +4,7 @@ use crate::effect::EffectPattern;
 use crate::record::Columns;
 use crate::study::input_plan::PlannedInputs;
 use crate::twin::{Hold, Integrator, Interval};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use toml::de::{DeTable, DeValue};
@@ -52,11 +52,25 @@ impl RecordTable {
 #[serde(deny_unknown_fields, default)]
 pub struct Library {
     /// These alone (all if empty): ids, or `id@target`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(
+        deserialize_with = "some_patterns",
+        skip_serializing_if = "Vec::is_empty"
+    )]
     pub only: Vec<EffectPattern>,
     /// Not these.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<EffectPattern>,
+}
+
+/// Reads a list that names something: an empty one would say *all* where it reads as *none*.
+fn some_patterns<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<EffectPattern>, D::Error> {
+    let all = Vec::<EffectPattern>::deserialize(from)?;
+    match all.is_empty() {
+        true => Err(D::Error::custom(
+            "only names no effect; leave it out for all of them, or name some",
+        )),
+        false => Ok(all),
+    }
 }
 
 impl Library {

@@ -305,6 +305,74 @@ fn a_misspelt_word_is_met_with_the_right_one() {
 }
 
 /// Options and keys that would be ignored are refused before the work.
+/// Each of these was accepted, or refused with a word that did not help.
+#[test]
+fn what_says_nothing_is_refused_with_its_remedy() {
+    let place = with_record();
+    let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
+    write("only.toml", "twin = 'van-der-pol'\n[library]\nonly = []\n");
+    write("fixed.toml", "twin = 'tanks'\n[fixed]\nk1 = 0.5\n");
+    let levels =
+        "[record]\nstep = 0.1\nsamples = 20\ninput = { levels = [-1e308, 1e308], hold = 5 }\n";
+    write("levels.toml", &format!("twin = 'tanks'\n{levels}"));
+    write("none.toml", "# nothing\n");
+    let effect = "[[effect]]\nid = 'sensor-clipping'\ntarget = 'sensor'\n";
+    write(
+        "range.toml",
+        &format!("{effect}magnitudes = {{ low = 2, high = 1 }}\n"),
+    );
+    write("late.toml", &format!("{effect}\n{effect}\nerror = 'x'\n"));
+    write(
+        "digits.toml",
+        "twin = 'van-der-pol'\n[record]\nsamples = 1e300\n",
+    );
+    let noise = "[twin]\nname = 'n'\n[parameters]\na = { prior = [0.5, 2] }\n[states]\nx = { rate = '-a*x', start = 1 }\n\
+        [outputs]\ny = { value = 'x', noise = 'sqrt(-x)' }\n[record]\nstep = 0.1\nsamples = 20\n";
+    write("noise.toml", noise);
+    write("one.csv", "t,u,y\n3,1,1\n3,1,2\n3,1,3\n");
+    let theta = "--theta nu=1";
+    for (call, parts) in [
+        (
+            "effects --study only.toml".to_owned(),
+            &["only.toml, line 3", "leave it out for all"][..],
+        ),
+        (
+            "simulate --study fixed.toml --theta k1=1,k2=1".to_owned(),
+            &["the study file fixes \"k1\""],
+        ),
+        (
+            "simulate --study levels.toml --theta k1=1".to_owned(),
+            &["levels.toml", "levels"],
+        ),
+        (
+            format!("simulate --twin van-der-pol {theta} --effect none.toml"),
+            &["none.toml, line 1", "add a table [[effect]]"],
+        ),
+        (
+            format!("simulate --twin van-der-pol {theta} --effect range.toml"),
+            &["range.toml", "low = 2 is above high = 1"],
+        ),
+        (
+            format!("simulate --twin van-der-pol {theta} --effect late.toml"),
+            &["late.toml, line 8"],
+        ),
+        (
+            format!("simulate --study digits.toml {theta}"),
+            &["digits.toml, line 3", "1e300"],
+        ),
+        (
+            "simulate --study noise.toml --theta a=1".to_owned(),
+            &["noise.toml", "level of noise is no finite number"],
+        ),
+        (
+            "resample one.csv --step 1 --out o.csv".to_owned(),
+            &["one.csv", "at least two times"],
+        ),
+    ] {
+        refused(place.path(), &call, parts);
+    }
+}
+
 #[test]
 fn nothing_is_ignored_without_a_word() {
     let place = with_record();

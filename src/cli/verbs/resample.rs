@@ -2,7 +2,7 @@
 
 use crate::cli::prelude::*;
 use crate::math::six_digits;
-use crate::record::{InputRule, Record, Resampled, resample};
+use crate::record::{InputRule, Record, RecordError, Resampled, resample};
 use crate::setting::number;
 use clap::{Args, ValueEnum};
 
@@ -46,13 +46,19 @@ enum Inputs {
 impl Verb for Resample {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         output::check_new_file(&self.out)?;
-        let record = self.columns.reader_without_twin().record(&self.record)?;
+        let (record, names) = self.columns.reader_without_twin().named(&self.record)?;
         let rule = match self.inputs {
             Inputs::Mean => InputRule::Mean,
             Inputs::Hold => InputRule::Hold,
         };
-        let new = resample(&record, self.step, rule, self.longest_gap).in_file(&self.record)?;
-        write_result(&self.out, |path| Ok::<_, Failure>(new.record.write(path)?))?;
+        let new = resample(&record, self.step, rule, self.longest_gap);
+        let new = match new {
+            Err(error @ RecordError::Step(_)) => Err(Failure::user(format!("--step: {error}"))),
+            new => new.in_file(&self.record),
+        }?;
+        write_result(&self.out, |path| {
+            Ok::<_, Failure>(new.record.write_named(path, &names)?)
+        })?;
         let grid = |record: &Record| {
             let (shortest, longest) = steps(record);
             json!({

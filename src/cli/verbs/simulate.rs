@@ -51,6 +51,14 @@ impl Verb for Simulate {
             magnitudes.extend(effects.iter().flat_map(Effect::given_by_parameter));
             twin = augment(twin, effects).in_file(path)?;
         }
+        if let Some(name) = given
+            .keys()
+            .find(|name| study.file().fixed.contains_key(*name))
+        {
+            return Err(wrong_theta(format!(
+                ": the study file fixes \"{name}\"; leave it out here, or there"
+            )));
+        }
         let theta = complete(&twin.parameters(), &given, &magnitudes)?;
         let noise = Noise::new(context.seed, "simulate", 0);
         let drive = match &self.input {
@@ -90,7 +98,9 @@ impl Verb for Simulate {
 impl Simulate {
     fn check_inputs(&self, twin: &Twin, drive: &Drive) -> Result<(), Failure> {
         let (given, expected) = (drive.inputs().ncols(), twin.signals().inputs.len());
-        let path = self.input.as_deref().unwrap_or(Path::new("input"));
+        let Some(path) = &self.input else {
+            return Ok(twin.check_drive(drive)?);
+        };
         if given == expected {
             return twin.check_drive(drive).in_file(path);
         }
@@ -131,7 +141,10 @@ fn complete(
     magnitudes: &BTreeMap<String, f64>,
 ) -> Result<Vec<f64>, Failure> {
     let names = space.names();
-    let all = names.join(", ");
+    let all = match names.is_empty() {
+        true => "none".into(),
+        false => names.join(", "),
+    };
     if let Some(name) = given.keys().find(|name| !names.contains(&name.as_str())) {
         return Err(wrong_theta(format!(
             ": no parameter is called \"{name}\"{}; there are {all}",

@@ -2,13 +2,14 @@
 
 use super::super::name;
 use super::inside::{Inside, check_files};
+use super::once_each::OnceEach;
 use crate::record::{Quantity, Signals};
 use crate::setting::number;
 use crate::storage::untrusted::message;
 use crate::study::{RecordPlan, RecordTable};
 use crate::twin::{DigitalTwin, Interval, Parameter, ParameterSpace};
 use serde::Deserialize;
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 /// Most parameters, inputs or outputs of one program.
 const MOST: usize = 1000;
@@ -64,14 +65,14 @@ struct ToldQuantity {
 impl Description {
     /// From the program's line; the error says what is wrong and what to write.
     pub fn parse(line: &str) -> Result<Self, String> {
-        let shown: Option<Map<String, Value>> = serde_json::from_str(line).ok();
-        if let Some(shown) = shown.filter(Inside::is_shown) {
-            return Self::with_inside(Inside::parse(&shown)?);
+        let wrong = |error: serde_json::Error| message(&error.to_string());
+        let OnceEach(shown) = serde_json::from_str(line).map_err(wrong)?;
+        if let Value::Object(shown) = &shown
+            && Inside::is_shown(shown)
+        {
+            return Self::with_inside(Inside::parse(shown)?);
         }
-        let told: Told = serde_json::from_str(line).map_err(|error| {
-            let problem = error.to_string();
-            message(&problem)
-        })?;
+        let told: Told = serde_json::from_str(line).map_err(wrong)?;
         name::check(&told.name).map_err(|problem| format!("name: {problem}"))?;
         let parameters = ParameterSpace::new(told.parameters.iter().map(|p| {
             let bounds = p.bounds.unwrap_or(p.prior);
@@ -95,6 +96,18 @@ impl Description {
         )?;
         if signals.outputs.is_empty() {
             return Err("no output; name at least one".into());
+        }
+        let channels = signals.inputs.iter().chain(&signals.outputs);
+        let channels = channels.map(|channel| channel.name.as_str());
+        let parameters_too = channels.chain(parameters.iter().map(|p| p.name.as_str()));
+        name::check_all("parameters, inputs and outputs together", parameters_too)?;
+        if signals
+            .inputs
+            .iter()
+            .chain(&signals.outputs)
+            .any(|c| c.name == "t")
+        {
+            return Err("a channel is called t, which is the time; rename it".into());
         }
         parameters.check().map_err(|error| error.to_string())?;
         let record = plan(&told.record)?;
@@ -254,11 +267,44 @@ mod tests {
                 "the twin has no input \"v\" (did you mean \"u\"?)",
             ),
             ("\"outputs\"", "\"outptus\"", "unknown key `outptus`"),
+            ("\"name\": \"y\"", "\"name\": \"u\"", "duplicate name u"),
+            ("\"name\": \"y\"", "\"name\": \"k\"", "duplicate name k"),
+            ("\"name\": \"y\"", "\"name\": \"t\"", "which is the time"),
+            ("60,", "60, \"samples\": 70,", "\"samples\" stands twice"),
         ] {
             assert!(GOOD.contains(from), "{from}");
             let message = Description::parse(&GOOD.replace(from, to)).unwrap_err();
             assert!(message.contains(part), "{message}");
             assert!(!message.contains('\n'), "{message}");
+        }
+    }
+
+    /// Where a line is no JSON, or a value is wrong, that is told: neither another form of description, nor a line that nobody wrote.
+    #[test]
+    fn faults_of_equations_are_told_where_they_are() {
+        const TEXT: &str = r#"{"name": "p", "parameters": {"a": {"prior": [0.1, 1]}}, "states": {"x": {"rate": "-a*x", "start": 1}},
+            "outputs": {"y": {"value": "x", "noise": 0.1}}, "record": {"step": 0.1, "samples": 20}}"#;
+        Description::parse(TEXT).unwrap();
+        for (from, to, part) in [
+            ("\"start\": 1}", "\"start\": 1,}", "trailing comma"),
+            ("0.1}}", "NaN}}", "expected value at line"),
+            (
+                "\"start\": 1}",
+                "\"start\": 1, \"start\": 2}",
+                "\"start\" stands twice",
+            ),
+            ("20}}", "20}", "EOF while parsing"),
+            ("20}}", "20}} {}", "trailing characters"),
+            (
+                "\"step\": 0.1",
+                "\"step\": \"x\"",
+                "record: step: found string",
+            ),
+        ] {
+            assert!(TEXT.contains(from), "{from}");
+            let message = Description::parse(&TEXT.replace(from, to)).unwrap_err();
+            assert!(message.contains(part), "{message}");
+            assert!(!message.contains("the description, line"), "{message}");
         }
     }
 }

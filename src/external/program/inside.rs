@@ -4,7 +4,7 @@ use super::super::name;
 use crate::equations::Equations;
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, message};
-use crate::study::{RecordTable, StudyFile};
+use crate::study::{RecordTable, StudyError, StudyFile};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -152,7 +152,14 @@ impl Inside {
             format!("{place}: {}", error.problem())
         })?;
         let file = StudyFile::parse(&writer.text, Path::new("the description"));
-        let file = file.map_err(|error| message(&error.to_string()))?;
+        // The lines are of a text that nobody has written.
+        let file = file.map_err(|error| match error {
+            StudyError::Syntax { line, message, .. } => {
+                let place = writer.places.get(line - 1).map_or("", String::as_str);
+                format!("{place}: {message}")
+            }
+            other => message(&other.to_string()),
+        })?;
         check_files(&file.record)?;
         Ok(Self {
             name: name.into(),

@@ -24,6 +24,7 @@ mod frame;
 pub(crate) mod fuzzing;
 mod health;
 mod inside;
+mod once_each;
 mod pool;
 mod protocol;
 mod running;

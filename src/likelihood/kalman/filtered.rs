@@ -171,7 +171,44 @@ impl Sink for Predictions {
     }
 }
 
+/// Means of the states at each `stride`-th sample, one list a state.
+struct Means<'k> {
+    kalman: &'k Kalman<'k>,
+    stride: usize,
+    all: Vec<Vec<f64>>,
+}
+
+impl Sink for Means<'_> {
+    fn filtered(&mut self, k: usize, state: Belief<'_>) {
+        if k.is_multiple_of(self.stride) {
+            let held = self.kalman.held_in_limits(Gaussian::of(state));
+            for (all, mean) in self.all.iter_mut().zip(held.mean) {
+                all.push(mean);
+            }
+        }
+    }
+}
+
 impl Kalman<'_> {
+    /// Means of the states given the rows so far, at each `stride`-th sample, one list a state.
+    ///
+    /// # Errors
+    ///
+    /// As [`log_likelihood`](Self::log_likelihood).
+    pub(crate) fn filtered_means(
+        &self,
+        theta: &[f64],
+        stride: usize,
+    ) -> Result<Vec<Vec<f64>>, FilterError> {
+        let mut means = Means {
+            kalman: self,
+            stride,
+            all: vec![vec![]; self.states],
+        };
+        self.run(theta, &mut means)?;
+        Ok(means.all)
+    }
+
     /// Everything that [`Filtered`] holds.
     ///
     /// # Errors

@@ -29,6 +29,9 @@ numbers! {
         /// Least measurement noise of outputs that stop at an end of their range, as a share of their motion: where the twin stops there, too,
         /// noise that vanishes would make those samples infinitely likely.
         stopped: f64 = 1e-3,
+        /// Rows of a record that tell sizes of states and levels of noise, at most, evenly spread: a median of so many is right to a hundredth of a
+        /// deviation. Half as many change guesses by less than their prior is wide; twice as many take their memory.
+        sized_rows: usize = 10_000,
         /// Distance of the first row from the start, in deviations of the noise, beyond which the record began elsewhere. At half of it a right start is
         /// given up in one of eighty records; at twice of it a wrong one of ten deviations is believed.
         elsewhere: f64 = 5.0,

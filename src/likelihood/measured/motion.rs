@@ -1,6 +1,6 @@
 //! Sizes of states: how far they move in runs, or as a filter follows them; and declared noise levels along the runs.
 
-use super::level::{DeclaredLevels, Measured};
+use super::level::{DeclaredLevels, MEASURED, Measured};
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::math::{deviation, median};
 use crate::record::Record;
@@ -45,7 +45,12 @@ pub(super) fn free_motion(
         .collect()
 }
 
-/// Shows each state of the twin's run under a record's inputs, the start first, until it diverges.
+/// Rows from one that tells a size to the next.
+fn stride(record: &Record) -> usize {
+    record.samples().div_ceil(MEASURED.sized_rows)
+}
+
+/// Shows states of the twin's run under a record's inputs, the start first, until it diverges.
 fn visit_run(
     base: &Composed,
     record: &Record,
@@ -60,6 +65,7 @@ fn visit_run(
     let mut x = vec![0.0; base.outline().states.len()];
     base.run_to_first_row(&acting, &mut work, &mut x);
     visit(&acting.at(0), &x);
+    let stride = stride(record);
     for k in (0..drive.samples()).filter(|&k| !acting.stands(k)) {
         let now = acting.at(k);
         base.step(&now, &mut x, &mut work);
@@ -70,7 +76,9 @@ fn visit_run(
         if !x.iter().all(|v| v.abs() < 1e12) {
             return;
         }
-        visit(&now, &x);
+        if k.is_multiple_of(stride) {
+            visit(&now, &x);
+        }
     }
 }
 
@@ -118,18 +126,15 @@ pub(super) fn followed_motion(
         return Ok(None);
     };
     let theta = loud.begun_loud(theta);
-    let settings = FilterSettings {
-        keep_states: true,
-        ..FilterSettings::default()
-    };
+    let settings = FilterSettings::default();
     let mut means: Vec<Vec<f64>> = vec![Vec::new(); twin.outline().states.len()];
     for record in records {
-        let filtered = Kalman::new(twin, record, &settings)?.filter(&theta);
-        let Some(states) = recoverable(filtered)?.and_then(|f| f.states) else {
+        let kalman = Kalman::new(twin, record, &settings)?;
+        let Some(followed) = recoverable(kalman.filtered_means(&theta, stride(record)))? else {
             return Ok(None);
         };
-        for (all, column) in means.iter_mut().zip(states.means.columns()) {
-            all.extend(column.iter());
+        for (all, followed) in means.iter_mut().zip(followed) {
+            all.extend(followed);
         }
     }
     Ok(Some(means.iter().map(|m| deviation(m)).collect()))

@@ -1,11 +1,15 @@
 //! Foreign text, fit for a terminal and for a message of one line.
 
+use crate::math::six_digits;
+use crate::setting::number;
 use std::borrow::Cow;
 
 /// Longest piece that a message quotes, in characters.
 const QUOTED: usize = 160;
 /// Longest message of a parser, in characters: it may list what it knows.
 const MESSAGE: usize = 2000;
+/// Digits of a number up to which a message shows it as it stands.
+const DIGITS: usize = 8;
 /// Words of parsers, and those of their readers.
 const WORDS: [(&str, &str); 17] = [
     (
@@ -69,7 +73,28 @@ pub(crate) fn quoted(text: &str) -> String {
 /// The message of a parser in one line, without the words of the language that this program is written in.
 pub(crate) fn message(text: &str) -> String {
     let replace = |text: String, (theirs, ours): &(&str, &str)| text.replace(theirs, ours);
-    one_line(&WORDS.iter().fold(text.to_owned(), replace), MESSAGE)
+    one_line(&WORDS.iter().fold(short_numbers(text), replace), MESSAGE)
+}
+
+/// Numbers of more digits than a message needs, to six of them: a parser writes all that a number has.
+fn short_numbers(text: &str) -> String {
+    let is_part = |c: char| c.is_alphanumeric() || matches!(c, '.' | '_');
+    let short = |word: &str| -> Option<String> {
+        let digits = word.bytes().filter(u8::is_ascii_digit).count();
+        let value: f64 = word.parse().ok().filter(|_| digits > DIGITS)?;
+        Some(number(six_digits(value)))
+    };
+    let mut all = String::with_capacity(text.len());
+    let mut rest = text;
+    while !rest.is_empty() {
+        let begin = rest.find(is_part).unwrap_or(rest.len());
+        let (between, from) = rest.split_at(begin);
+        let (word, left) = from.split_at(from.find(|c| !is_part(c)).unwrap_or(from.len()));
+        all += between;
+        all += &short(word).unwrap_or_else(|| word.into());
+        rest = left;
+    }
+    all
 }
 
 /// As [`excerpt`], with `most` characters.
@@ -138,6 +163,13 @@ mod tests {
         assert_eq!(excerpt(&"ä".repeat(500)).chars().count(), QUOTED + 2);
         assert_eq!(excerpt("a\u{202e}b"), "a b");
         assert_eq!(excerpt(&" ".repeat(500)), "");
+        let long = format!(
+            "found `1{}`, 0.{}1 in a_123456789",
+            "0".repeat(308),
+            "0".repeat(300)
+        );
+        assert_eq!(message(&long), "found `1e308`, 1e-301 in a_123456789");
+        assert_eq!(message("row 12345678, 0.25"), "row 12345678, 0.25");
         assert_eq!(quoted("t\u{feff}1\u{a0}0"), "t\\u{feff}1\\u{a0}0");
     }
 

@@ -151,7 +151,9 @@ impl Composed {
     /// Returns whether a record fits the noise level of this state.
     pub(crate) fn fits_noise_of(&self, state: usize) -> bool {
         self.parts.list.iter().any(|added| match &added.part {
-            TwinPart::Levels(levels) => !matches!(levels.process[state], LevelSource::Declared),
+            // Memories of parts stand behind the states that levels are of.
+            TwinPart::Levels(levels) => (levels.process.get(state))
+                .is_some_and(|source| !matches!(source, LevelSource::Declared)),
             _ => false,
         })
     }

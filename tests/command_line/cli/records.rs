@@ -1,6 +1,7 @@
 //! Records as data loggers write them: other names, separators, encodings, time stamps, steps.
 
 use super::{done, json, refused, truetwin};
+use sha2::{Digest, Sha256};
 use std::fs;
 use tempfile::TempDir;
 
@@ -313,6 +314,45 @@ fn the_unit_of_time_stamps_is_not_doubted() {
     let record = place.write("stamped.csv", format!("t,u,y\n{rows}"));
     let text = done(&["check", &record, "--twin", "tanks"]);
     assert!(!text.contains("seems to be in"), "{text}");
+}
+
+/// A record keeps the names of its columns, and is what its twin reads; the checksum is that of all bytes, with or without a last end of line.
+#[test]
+fn a_resampled_record_keeps_its_names() {
+    let place = Place::new();
+    for (name, header, other) in [
+        ("zero.csv", "t,u,y0,y1", "t,u,y1,y0"),
+        ("missing.csv", "t,u1,y1,y3", "y3,t,u1,y1"),
+        ("plain.csv", "t,u,y", "t,u,y"),
+    ] {
+        let row = |k: i32| {
+            let cells: Vec<String> = (0..header.split(',').count() as i32)
+                .map(|j| (10 * j + k).to_string())
+                .collect();
+            cells.join(",")
+        };
+        let text = format!("{header}\n{}\n{}\n{}", row(0), row(1), row(2));
+        let record = place.write(name, &text);
+        let new = place.at(&format!("new-{name}"));
+        let told = json(&["resample", &record, "--step", "1", "--out", &new, "--json"]);
+        let sum = Sha256::digest(text.as_bytes());
+        let sum: String = sum.iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!(told["provenance"]["files"][0]["sha256"], sum, "{told}");
+        assert_eq!(fs::read_to_string(&new).unwrap(), format!("{text}\n"));
+        let turned = place.write(name, text.replacen(header, other, 1));
+        if other != header {
+            let again = place.at(&format!("turned-{name}"));
+            done(&["resample", &turned, "--step", "1", "--out", &again]);
+            let first = fs::read_to_string(&again).unwrap();
+            assert!(first.starts_with("t,u"), "{first}");
+        }
+    }
+    let twice = place.write("twice.csv", "t,y1,y1\n0,1,1\n1,1,1\n");
+    let out = place.at("o.csv");
+    let call = ["resample", &twice, "--step", "1", "--out", &out];
+    refused(&call, &["\"y1\" appears twice"]);
+    let zero = ["resample", &place.at("r.csv"), "--step", "0", "--out", &out];
+    refused(&zero, &["--step: ", "0 s"]);
 }
 
 /// Lines that hold no sample count: a row of a message is the line of an editor.
