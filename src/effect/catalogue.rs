@@ -178,10 +178,7 @@ impl Catalogue {
         let file: EffectFile = toml::from_str(text)
             .map_err(|error| at(error.span().map_or(0, |span| span.start), error.message()))?;
         if file.effect.is_empty() {
-            return Err(at(
-                0,
-                "no effect; add a table [[effect]] with id and target",
-            ));
+            return Err(at(0, "no effect; give it one with id and target"));
         }
         (file.effect.into_iter())
             .map(|table| {
@@ -234,7 +231,7 @@ mod tests {
         assert!(told.contains("line 7"), "{told}");
         let told = Catalogue::default().parse("# none\n").unwrap_err();
         assert!(
-            told.to_string().contains("no effect; add a table"),
+            told.to_string().contains("no effect; give it one"),
             "{told}"
         );
     }

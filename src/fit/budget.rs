@@ -57,8 +57,8 @@ numbers! {
         restarts_from_draws: usize = 6,
         /// Shares of the records that a black box is fitted to before the whole of them.
         grown_shares: [f64; 2] = [0.25, 0.5],
-        /// Rows that tell where the tops of a long record are: searches begin there, and end on all of it. They save a fifth to two fifths of a
-        /// fit of 20 000 to 100 000 rows, and nothing where a record begins at rest. Half and twice as many have not been tried.
+        /// Rows that tell where the tops of a long record are: searches begin there, and those that meet there end on all of it as one. They save
+        /// half of a fit of 100 000 rows, and nothing where a record begins at rest. Half and twice as many have not been tried.
         sketched_rows: usize = 2000,
         /// The same as a share, where that is more: each sketch then tells the next, ten times longer, where to begin.
         sketched_share: f64 = 0.1,
@@ -222,13 +222,13 @@ impl Passes {
 }
 
 /// The stages of a fit behind its search. Where a partial answer is wanted, those that are left once the work is to stop are skipped.
-pub(crate) struct Stages {
+pub(crate) struct FitStages {
     passes: Passes,
     gives_partial: bool,
     is_cut: bool,
 }
 
-impl Stages {
+impl FitStages {
     pub fn new(passes: &Passes, gives_partial: bool) -> Self {
         Self {
             passes: passes.clone(),
@@ -303,8 +303,8 @@ mod tests {
     fn stages_are_skipped_once_the_work_is_to_stop() {
         let passes = Passes::heard_by(&Progress::new(Arc::new(Stop)));
         let stage = || Ok(passes.count(1).map(|()| 1)?);
-        assert!(Stages::new(&passes, false).of(0, stage).is_err());
-        let mut stages = Stages::new(&passes, true);
+        assert!(FitStages::new(&passes, false).of(0, stage).is_err());
+        let mut stages = FitStages::new(&passes, true);
         assert!(stages.whole(stage).is_ok());
         assert!(!stages.are_cut() && passes.count(1).is_err());
         assert_eq!(stages.of(0, stage).unwrap(), 0);

@@ -11,6 +11,31 @@ use crate::math::deviation;
 use crate::record::Signal;
 use crate::twin::{StepsTaken, begun};
 
+/// The way in which a fitted twin follows its records.
+pub(super) struct FollowedRecords {
+    pub starts: Vec<FittedStart>,
+    /// Noise-free run beside each record; none where it diverges.
+    pub free_runs: Vec<Option<Signal>>,
+    pub errors: Vec<OutputErrors>,
+    /// Innovations of each record in their own units.
+    pub residuals: Vec<Signal>,
+}
+
+impl FollowedRecords {
+    /// At the full θ.
+    pub fn new(problem: &Problem, theta: &[f64]) -> Result<Self, FilterError> {
+        let first = problem.first_states(theta)?;
+        let free_runs = free_runs(problem, theta, &first)?;
+        let filtered = problem.filtered(theta)?;
+        Ok(Self {
+            starts: starts(problem, &first),
+            errors: errors(problem, &filtered, &free_runs),
+            free_runs,
+            residuals: (filtered.into_iter()).map(|f| f.standardised).collect(),
+        })
+    }
+}
+
 /// States at the first sample of each record, given the whole record.
 pub(crate) fn starts(problem: &Problem, first: &[Gaussian]) -> Vec<FittedStart> {
     let states = problem.outline().states;

@@ -42,7 +42,7 @@ mod solver;
 pub(crate) mod starts;
 
 pub use crate::twin::Side;
-pub(crate) use budget::{ITERATIONS, Passes, Stages};
+pub(crate) use budget::{FitStages, ITERATIONS, Passes};
 pub(crate) use hold::other_hold;
 pub(crate) use outcome::NOT_CONVERGED;
 pub use outcome::{

@@ -1,5 +1,6 @@
 //! Result of a fit.
 
+use super::evidence::Evidence;
 use super::posterior::{Posterior, PosteriorRegion};
 use super::profile::Profile;
 use crate::record::Signal;
@@ -115,6 +116,13 @@ pub struct FittedValue {
     pub at_bound: Option<Side>,
 }
 
+impl FittedValue {
+    /// Takes error and interval back: about a point that is no top they say nothing.
+    pub(super) fn withhold_error(&mut self) {
+        (self.std_error, self.low, self.high) = (f64::NAN, f64::NAN, f64::NAN);
+    }
+}
+
 /// A fitted noise level.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
@@ -176,6 +184,17 @@ pub struct FitEvidence {
     pub std_error: Option<f64>,
     /// Number of independent draws that the correction is worth.
     pub effective_draws: f64,
+}
+
+impl From<Evidence> for FitEvidence {
+    fn from(of: Evidence) -> Self {
+        Self {
+            log_evidence: of.log_evidence,
+            laplace: of.laplace,
+            std_error: of.error,
+            effective_draws: of.effective,
+        }
+    }
 }
 
 /// The end of a search.

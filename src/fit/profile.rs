@@ -50,6 +50,16 @@ pub(crate) enum ProfilesOf {
     All,
 }
 
+impl ProfilesOf {
+    /// Those that are told beside the end of a search: where it is no top nothing is stated, and so nothing profiled unasked.
+    pub fn beside(self, arrived: bool) -> Self {
+        match self {
+            Self::Shaped if !arrived => Self::None,
+            which => which,
+        }
+    }
+}
+
 /// Profiles of a fit, and names of those parameters whose intervals hold theirs. The likelihood of a black box costs simulations: nothing is profiled
 /// there unless it is asked for.
 pub(super) fn profiles(

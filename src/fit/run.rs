@@ -4,17 +4,18 @@ use super::certificate::{Certificate, restarted};
 use super::climb::{Fitted, climb};
 use super::doubts::Doubts;
 use super::evidence::evidence;
-use super::follow::{errors, free_runs, starts, steps_taken, swallowed};
-use super::outcome::{Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue};
+use super::follow::{FollowedRecords, steps_taken, swallowed};
+use super::outcome::{
+    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue,
+};
 use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
 use super::problem::Problem;
 use super::profile::{Profile, ProfilesOf, profiles};
 use super::searched::Searched;
 use super::starts::{agreed, agreeing, polish};
-use crate::fit::budget::{BUDGET, ITERATIONS, Stages};
+use crate::fit::budget::{BUDGET, FitStages, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, Measured};
-use crate::record::Signal;
 use crate::twin::{Noise, Role, Twin};
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -30,7 +31,7 @@ pub(crate) fn run(
     measured: &Measured,
     searched: Searched,
     (settings, which): (&FitSettings, ProfilesOf),
-    stages: &mut Stages,
+    stages: &mut FitStages,
 ) -> Result<Option<Fit>, FilterError> {
     let clock = Instant::now();
     let noise = settings.noise();
@@ -63,23 +64,17 @@ pub(crate) fn run(
     let spread = FitIntervals::new(&problem, &fitted, &draws.thetas, settings.level);
     let (mut parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
     let arrived = arrived && certificate.has_converged();
-    // Beside a point that is no top nothing is stated, and so nothing profiled unasked.
-    let which = match which {
-        ProfilesOf::Shaped if !arrived => ProfilesOf::None,
-        which => which,
-    };
+    let which = which.beside(arrived);
     let profiled = stages.of(<_>::default(), || {
         profiles(&problem, &fitted, (which, settings.level))
     })?;
     let profiles = stated(&problem, profiled, &mut parameters);
-    let (starts, free_runs, errors, residuals) = stages.whole(|| {
-        let first = problem.first_states(&fitted.theta)?;
-        let free_runs = free_runs(&problem, &fitted.theta, &first)?;
-        let filtered = problem.filtered(&fitted.theta)?;
-        let errors = errors(&problem, &filtered, &free_runs);
-        let residuals: Vec<Signal> = (filtered.into_iter()).map(|f| f.standardised).collect();
-        Ok::<_, FilterError>((starts(&problem, &first), free_runs, errors, residuals))
-    })?;
+    let FollowedRecords {
+        starts,
+        free_runs,
+        errors,
+        residuals,
+    } = stages.whole(|| FollowedRecords::new(&problem, &fitted.theta))?;
     let posterior = match asked {
         Some(_) if draws.round.is_some() => stages.of(None, || {
             table(&problem, &draws, noise.child("starts")).map(Some)
@@ -87,10 +82,6 @@ pub(crate) fn run(
         _ => None,
     };
     let own = measured.twin.parameters().len() - levels.len();
-    let start = |state: &str| {
-        let start = starts.iter().find(|start| start.name == state)?;
-        Some((start.value, start.std_error))
-    };
     let mut convergence = Convergence {
         converged: arrived,
         distance: certificate.distance,
@@ -100,10 +91,7 @@ pub(crate) fn run(
     let ends = without.is_none_or(|base| fitted.log_likelihood > base - BUDGET.below_without);
     convergence.converged &= ends;
     if !convergence.converged {
-        // An error about a point that is no top says nothing.
-        for value in &mut parameters {
-            (value.std_error, value.low, value.high) = (f64::NAN, f64::NAN, f64::NAN);
-        }
+        parameters.iter_mut().for_each(FittedValue::withhold_error);
     }
     let mut doubts = Doubts::new(&problem, &fitted.theta);
     let by_step = doubts.steps(&free_runs);
@@ -118,16 +106,11 @@ pub(crate) fn run(
     Ok(Some(Fit {
         parameters,
         noise: noise_levels,
-        region: PosteriorRegion::new(&problem, &fitted, &draws, start, own),
+        region: PosteriorRegion::new(&problem, &fitted, &draws, told(&starts), own),
         starts,
         level: settings.level,
         log_likelihood: fitted.log_likelihood,
-        evidence: evidence.map(|e| FitEvidence {
-            log_evidence: e.log_evidence,
-            laplace: e.laplace,
-            std_error: e.error,
-            effective_draws: e.effective,
-        }),
+        evidence: evidence.map(FitEvidence::from),
         convergence,
         errors,
         warnings: doubts.all,
@@ -141,6 +124,14 @@ pub(crate) fn run(
         residuals,
         free_runs,
     }))
+}
+
+/// Returns what is told of the first states of the first record: value and standard error.
+fn told(starts: &[FittedStart]) -> impl Fn(&str) -> Option<(f64, f64)> {
+    |state| {
+        let start = starts.iter().find(|start| start.name == state)?;
+        Some((start.value, start.std_error))
+    }
 }
 
 /// States intervals that hold both that of the posterior and that of the profile, for the named parameters; a side without an end reaches to the bound.

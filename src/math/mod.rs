@@ -25,8 +25,8 @@ pub(crate) use lagged::{Lagged, LaggedSignals};
 pub(crate) use least_squares::{LeastSquares, Regression, Regressors};
 pub(crate) use number::{Condition, LANES, Lanes, Mask, Number, nearest};
 pub(crate) use statistics::{
-    CONSTANT, clopper_pearson, correlation, deviation, ends, is_constant, largest, median, norm,
-    quantile, rank_p_value, six_digits, three_digits, unit,
+    CONSTANT, clopper_pearson, correlation, deviation, ends, is_constant, largest, log_mean,
+    median, norm, quantile, rank_p_value, six_digits, three_digits, unit,
 };
 pub(crate) use svd::{principal_axes, solve_truncated, thin_svd};
 pub(crate) use whitening::Whitening;

@@ -100,6 +100,16 @@ pub fn median(values: &[f64]) -> Result<f64, MathError> {
     quantile(values, 0.5)
 }
 
+/// Returns the log of the mean of exponentials.
+pub fn log_mean(logs: &[f64]) -> f64 {
+    let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !top.is_finite() {
+        return top;
+    }
+    let sum: f64 = logs.iter().map(|l| (l - top).exp()).sum();
+    top + (sum / logs.len() as f64).ln()
+}
+
 /// Returns the p-value of `observed` among `null`, large being extreme; exact in finite samples.
 ///
 /// ```text

@@ -4,7 +4,8 @@
 //! names by [`Columns`]. Columns are separated by commas, semicolons or tabs. An output that was not measured is an empty cell, `nan` or
 //! `NA`; its column may be left out where the twin is known. Steps that are the same to 1e-3 count as one. Rows of one time are replicates. Rows are counted as an editor counts lines: the header is row 1.
 
-use super::channels::{Columns, Wanted, columns, header};
+use super::channels::{columns, header};
+use super::columns::{Columns, Wanted};
 use super::parquet;
 use super::table::Table;
 use super::text::Text;

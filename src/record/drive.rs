@@ -395,7 +395,7 @@ impl FileRows {
     }
 }
 
-/// How rows stand in a file is no part of what was measured.
+/// The rows of a file are no part of what was measured.
 impl PartialEq for FileRows {
     fn eq(&self, _: &Self) -> bool {
         true

@@ -7,6 +7,7 @@
 //! | read and write CSV, read Parquet | [`Record::read`], [`Record::write`], [`Drive::read`] |
 
 mod channels;
+mod columns;
 mod csv;
 mod drive;
 mod error;
@@ -18,8 +19,9 @@ mod stamp;
 mod table;
 mod text;
 
-pub(crate) use channels::{Columns, LARGEST, column_names};
+pub(crate) use channels::{LARGEST, column_names};
 pub use channels::{Quantity, Signals};
+pub(crate) use columns::Columns;
 pub(crate) use csv::{RecordReader, drive_csv_text, parse_record, record_csv_text, twin_csv_text};
 pub(crate) use drive::UNIFORM;
 pub(crate) use drive::check_sizes;

@@ -1,6 +1,7 @@
 //! The numbers of a record file, checked cell by cell.
 
-use super::channels::{Wanted, column_names, columns, is_usual};
+use super::channels::{column_names, columns, is_usual};
+use super::columns::Wanted;
 use super::drive::FileRows;
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};

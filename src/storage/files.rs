@@ -3,24 +3,10 @@
 use super::StorageError;
 pub(crate) use super::error::{folder, with_remedy};
 use super::names::places_beside;
-use super::unfinished::{Unfinished, file_beside};
+use super::unfinished::{Unfinished, file_beside, note_result};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::path::Path;
 use tempfile::NamedTempFile;
-
-/// First result of this process that is in its place.
-static RESULT: OnceLock<PathBuf> = OnceLock::new();
-
-/// The first result of this process that is in its place: work that is stopped afterwards has lost nothing.
-pub(crate) fn result() -> Option<&'static Path> {
-    RESULT.get().map(PathBuf::as_path)
-}
-
-/// Notes a result that is in its place.
-pub(super) fn note_result(place: &Path) {
-    let _ = RESULT.set(place.into());
-}
 
 /// Writes a new file.
 pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {

@@ -21,4 +21,4 @@ pub(crate) mod untrusted;
 pub(crate) mod work;
 
 pub use error::StorageError;
-pub(crate) use unfinished::{NewFolder, remove_unfinished, sweep_beside};
+pub(crate) use unfinished::{NewFolder, remove_unfinished, result, sweep_beside};

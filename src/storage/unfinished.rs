@@ -7,17 +7,29 @@
 
 use super::StorageError;
 use super::error::folder;
-use super::files::note_result;
 use super::names::{is_unfinished, named, places_beside, prefix};
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use tempfile::{Builder, NamedTempFile, TempDir};
 
 /// Unfinished files and folders of this process, which are removed where it ends without unwinding. Held while one is made, moved or removed.
 static MADE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// First result of this process that is in its place.
+static RESULT: OnceLock<PathBuf> = OnceLock::new();
+
+/// The first result of this process that is in its place: work that is stopped afterwards has lost nothing.
+pub(crate) fn result() -> Option<&'static Path> {
+    RESULT.get().map(PathBuf::as_path)
+}
+
+/// Notes a result that is in its place.
+pub(super) fn note_result(place: &Path) {
+    let _ = RESULT.set(place.into());
+}
 
 fn made_here() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     MADE.lock().unwrap_or_else(PoisonError::into_inner)

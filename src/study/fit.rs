@@ -3,7 +3,7 @@
 use super::{Study, StudyError};
 use crate::effect::Effect;
 use crate::fit::{
-    Fit, FitScore, FitSettings, Passes, ProfilesOf, Stages, Subject, Warning, other_hold, run,
+    Fit, FitScore, FitSettings, FitStages, Passes, ProfilesOf, Subject, Warning, other_hold, run,
     score,
 };
 use crate::hypothesis::search::asked::with_asked_noise;
@@ -111,7 +111,7 @@ impl Study {
             Ok((measured, searched))
         };
         let (mut measured, mut searched) = fitted(&self.twin)?;
-        let mut stages = Stages::new(passes, settings.give_partial);
+        let mut stages = FitStages::new(passes, settings.give_partial);
         let mut other = match searched.fits.first() {
             Some(best) if self.asks_hold() => {
                 stages.of(None, || other_hold(&searched.problem, best))?

@@ -112,7 +112,7 @@ fn odd_record_files_are_named_as_such() {
         ("t,y\n0,1\u{a0}000\n".as_bytes(), &["1\\u{a0}000"]),
         (
             b"t,y\n0,1\n0,2\n",
-            &["row 3, column t: 0 s follows 0 s", "must increase"],
+            &["all rows have the time 0 s", "at least two times"],
         ),
         (
             b"t,y\n0,1\n1,1e300\n",
@@ -341,12 +341,12 @@ fn what_says_nothing_is_refused_with_its_remedy() {
             &["the study file fixes \"k1\""],
         ),
         (
-            "simulate --study levels.toml --theta k1=1".to_owned(),
+            "simulate --study levels.toml --theta k1=1,k2=1,k3=1,k4=1".to_owned(),
             &["levels.toml", "levels"],
         ),
         (
             format!("simulate --twin van-der-pol {theta} --effect none.toml"),
-            &["none.toml, line 1", "add a table [[effect]]"],
+            &["none.toml, line 1", "each effect is a table [[effect]]"],
         ),
         (
             format!("simulate --twin van-der-pol {theta} --effect range.toml"),

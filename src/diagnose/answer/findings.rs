@@ -3,9 +3,9 @@
 use super::posterior::{Function, Hypotheses, Places, Posterior, Set, log_sum};
 use crate::diagnose::search::Explanations;
 use crate::effect::TargetKind;
-use crate::fit::evidence::log_mean;
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::term::{Nature, Part, Term};
+use crate::math::log_mean;
 use std::sync::Arc;
 
 impl Explanations {

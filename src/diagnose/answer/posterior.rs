@@ -13,7 +13,7 @@
 
 use crate::diagnose::outcome::{Probabilities, TargetShare};
 use crate::diagnose::thresholds::{Price, THRESHOLDS};
-use crate::fit::evidence::log_mean;
+use crate::math::log_mean;
 use std::collections::BTreeMap;
 
 /// Places and the share of each.

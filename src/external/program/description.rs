@@ -293,7 +293,7 @@ mod tests {
                 "\"start\": 1, \"start\": 2}",
                 "\"start\" stands twice",
             ),
-            ("20}}", "20}", "EOF while parsing"),
+            ("20}}", "20}", "it ends inside an object"),
             ("20}}", "20}} {}", "trailing characters"),
             (
                 "\"step\": 0.1",

@@ -1,12 +1,12 @@
 //! Evidence by importance sampling.
 
-use super::expansion::{Expansion, log_mean};
+use super::expansion::Expansion;
 use super::sizes::SizePrior;
 use crate::fit::axis::EvidencePrior;
 use crate::fit::budget::BUDGET;
 use crate::fit::posterior::{PosteriorSample, Proposal, Round, effective};
 use crate::likelihood::kalman::FilterError;
-use crate::math::deviation;
+use crate::math::{deviation, log_mean};
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{LN_2, TAU};

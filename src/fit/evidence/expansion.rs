@@ -4,6 +4,7 @@ use super::sizes::SizePrior;
 use crate::fit::axis::EvidencePrior;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
+use crate::math::log_mean;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{LN_2, TAU};
 
@@ -196,14 +197,4 @@ impl<'a> Expansion<'a> {
             })
             .sum()
     }
-}
-
-/// log of the mean of exponentials.
-pub(crate) fn log_mean(logs: &[f64]) -> f64 {
-    let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if !top.is_finite() {
-        return top;
-    }
-    let sum: f64 = logs.iter().map(|l| (l - top).exp()).sum();
-    top + (sum / logs.len() as f64).ln()
 }

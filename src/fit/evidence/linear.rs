@@ -1,7 +1,7 @@
 //! Evidence of a function where the likelihood is quadratic in its coefficients: for screens.
 
-use super::expansion::log_mean;
 use super::sizes::sizes;
+use crate::math::log_mean;
 use nalgebra::{DMatrix, DVector};
 
 /// log Z of coefficients β over that of none, averaged over the sizes and weights of their prior, in nats:

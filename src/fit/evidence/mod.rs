@@ -23,7 +23,7 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use expansion::{CREDIT, Laplace, log_mean};
+pub(crate) use expansion::{CREDIT, Laplace};
 pub(crate) use linear::linear_evidence;
 
 use super::climb::Fitted;

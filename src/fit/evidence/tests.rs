@@ -6,6 +6,7 @@ use crate::fit::axis::Axis;
 use crate::fit::axis::EvidencePrior;
 use crate::fit::climb::climb;
 use crate::fit::posterior::{PosteriorSample, posterior};
+use crate::math::log_mean;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Now, Outline, Parameter, StateSpace, Twin};
 use nalgebra::{DMatrix, DVector};

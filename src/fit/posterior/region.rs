@@ -114,7 +114,7 @@ fn first_order(problem: &Problem, fitted: &Fitted, widths: &DVector<f64>) -> DMa
 mod tests {
     use super::*;
     use crate::fit::climb::climb;
-    use crate::fit::{FitSettings, Passes, ProfilesOf, Searched, Stages, run};
+    use crate::fit::{FitSettings, FitStages, Passes, ProfilesOf, Searched, run};
     use crate::likelihood::{Beliefs, measured};
     use crate::record::{Drive, Record};
     use crate::twin::{DigitalTwin, Noise, Twin};
@@ -161,7 +161,7 @@ mod tests {
                 let problem = Problem::of_measured(&measured, records);
                 let searched = Searched::alone(problem, noise).unwrap();
                 let settings = FitSettings::default();
-                let stages = &mut Stages::new(&Passes::default(), false);
+                let stages = &mut FitStages::new(&Passes::default(), false);
                 let fit = run(&measured, searched, (&settings, ProfilesOf::None), stages);
                 let region = fit.unwrap().unwrap().region.unwrap();
                 ((region.theta[0] - 1.5) / region.axes[(0, 0)]).powi(2)

@@ -4,9 +4,9 @@
 
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
-use crate::fit::evidence::log_mean;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
+use crate::math::log_mean;
 use crate::twin::Source;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -15,8 +15,13 @@ use std::f64::consts::{PI, TAU};
 /// Degrees of freedom of a proposal: heavier tails than a posterior's.
 const FREEDOM: usize = 5;
 
-/// Highest degree of the polynomials that control variates are made of.
-const DEGREES: usize = 4;
+/// Hermite polynomials of degree 1 to 4, of unit variance under a standard normal.
+const HERMITE: [fn(f64) -> f64; 4] = [
+    |z| z,
+    |z| (z * z - 1.0) / 2f64.sqrt(),
+    |z| (z * z - 3.0) * z / 6f64.sqrt(),
+    |z| ((z * z - 6.0) * z * z + 3.0) / 24f64.sqrt(),
+];
 
 /// A Student density about one top, in the entries of φ that may move.
 #[derive(Debug, Clone)]
@@ -105,8 +110,7 @@ impl Proposal {
         self.root.solve_lower_triangular(&off)
     }
 
-    /// Adds `weight` times the normal that this density stands for, and the same times Hermite polynomials of degree 1 to 4 along each axis, all of
-    /// unit variance under that normal.
+    /// Adds the normal that this density stands for, times a weight, and the same times Hermite polynomials along each axis.
     fn add_controls(&self, phi: &DVector<f64>, log_weight: f64, to: &mut [f64]) {
         let Some(z) = self.standardised(phi) else {
             return;
@@ -114,13 +118,7 @@ impl Proposal {
         let normal = (self.normal_peak - 0.5 * z.norm_squared() + log_weight).exp();
         let (first, others) = to.split_at_mut(1);
         first[0] += normal;
-        let polynomials: [fn(f64) -> f64; DEGREES] = [
-            |z| z,
-            |z| (z * z - 1.0) / 2f64.sqrt(),
-            |z| (z * z - 3.0) * z / 6f64.sqrt(),
-            |z| ((z * z - 6.0) * z * z + 3.0) / 24f64.sqrt(),
-        ];
-        for (row, polynomial) in others.chunks_exact_mut(z.len()).zip(polynomials) {
+        for (row, polynomial) in others.chunks_exact_mut(z.len()).zip(HERMITE) {
             for (to, z) in row.iter_mut().zip(z.iter()) {
                 *to += normal * polynomial(*z);
             }
@@ -244,7 +242,7 @@ impl Round {
     /// ```
     pub fn controls(&self, draw: usize) -> Vec<f64> {
         let log_weight = -self.mixtures[draw] - (self.proposals.len() as f64).ln();
-        let mut controls = vec![0.0; 1 + DEGREES * self.free.len()];
+        let mut controls = vec![0.0; 1 + HERMITE.len() * self.free.len()];
         for proposal in &self.proposals {
             proposal.add_controls(&self.draws[draw], log_weight, &mut controls);
         }
@@ -400,7 +398,7 @@ mod tests {
         let ratio = |phi| (other.log_density(phi) - proposal.log_density(phi)).exp();
         let mean = draws.iter().map(ratio).sum::<f64>() / n;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
-        let mut controls = vec![0.0; 1 + 2 * DEGREES];
+        let mut controls = vec![0.0; 1 + 2 * HERMITE.len()];
         for phi in &draws {
             proposal.add_controls(phi, -proposal.log_density(phi), &mut controls);
         }

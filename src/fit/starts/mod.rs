@@ -284,3 +284,55 @@ pub(crate) fn polish(
 pub(super) fn sort(fits: &mut [Fitted]) {
     fits.sort_by(|a, b| b.objective.total_cmp(&a.objective));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::likelihood::{Beliefs, measured};
+    use crate::record::{Drive, Record};
+    use crate::twin::{DigitalTwin, Twin};
+    use crate::twins::VanDerPol;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    #[test]
+    fn what_is_the_same_is_done_once() {
+        let calls = AtomicUsize::new(0);
+        let halves = once_each(
+            &[4, 7, 5, 8, 6],
+            |a, b| a / 2 == b / 2,
+            |item| {
+                calls.fetch_add(1, Ordering::Relaxed);
+                Ok(item / 2)
+            },
+        );
+        assert_eq!(halves.unwrap(), [2, 3, 2, 4, 3]);
+        assert_eq!(calls.into_inner(), 3);
+    }
+
+    /// Searches of a long record that meet over its beginning end as one, each counted, where a search over all of it ends.
+    #[test]
+    fn searches_of_a_long_record_end_where_one_of_it_does() {
+        let drive = Drive::autonomous(0.05, 9000).unwrap();
+        let outputs = VanDerPol.simulate(&[1.3], &drive, Noise::new(1, "long", 0));
+        let records = [Record::new(drive, outputs.unwrap()).unwrap()];
+        let beliefs = Beliefs {
+            step: 0.05,
+            ..Beliefs::default()
+        };
+        let measured = measured(&Twin::new(VanDerPol), &records, &beliefs).unwrap();
+        let problem = Problem::of_measured(&measured, records);
+        assert_eq!(sketch(&problem).unwrap().samples(), 2000);
+        let starts: Vec<Vec<f64>> = [1.0, 1.5, 2.0]
+            .map(|nu| {
+                let mut theta = problem.centre();
+                theta[0] = nu;
+                problem.begin(&theta)
+            })
+            .into();
+        let found = climbs(&problem, &starts, ITERATIONS).unwrap();
+        let whole = climb(&problem, &starts[0], ITERATIONS).unwrap().unwrap();
+        assert_eq!((found.len(), agreeing(&found)), (3, 3));
+        assert!(found.iter().all(|fit| fit.theta == found[0].theta));
+        assert!((found[0].objective - whole.objective).abs() < 0.02);
+    }
+}

@@ -7,12 +7,11 @@ use super::model::Model;
 use super::screen::{functions, scan_from};
 use super::traces::screened;
 use super::{beside, merged, ways};
-use crate::fit::evidence::log_mean;
 use crate::fit::reference::Reference;
 use crate::hypothesis::limits::SEARCH;
 use crate::hypothesis::term::{Nature, Term};
 use crate::likelihood::kalman::FilterError;
-use crate::math::median;
+use crate::math::{log_mean, median};
 use rayon::prelude::*;
 use std::sync::Arc;
 

@@ -8,13 +8,14 @@
 
 use super::breadth::Breadth;
 use super::model::Model;
-use crate::fit::evidence::{linear_evidence, log_mean};
+use crate::fit::evidence::linear_evidence;
 use crate::fit::reference::Reference;
 use crate::hypothesis::basis::{Of, TERMS, terms_of_one};
 use crate::hypothesis::entry::Entry;
 use crate::hypothesis::term::Term;
 use crate::hypothesis::trace::Trail;
 use crate::likelihood::kalman::{FilterError, Responses, recoverable};
+use crate::math::log_mean;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;

@@ -8,10 +8,8 @@ use std::borrow::Cow;
 const QUOTED: usize = 160;
 /// Longest message of a parser, in characters: it may list what it knows.
 const MESSAGE: usize = 2000;
-/// Digits of a number up to which a message shows it as it stands.
-const DIGITS: usize = 8;
 /// Words of parsers, and those of their readers.
-const WORDS: [(&str, &str); 17] = [
+const WORDS: [(&str, &str); 19] = [
     (
         "as i128, expected any valid TOML value",
         "has too many digits",
@@ -35,6 +33,8 @@ const WORDS: [(&str, &str); 17] = [
     ("unknown field", "unknown key"),
     ("missing field", "missing key"),
     ("unknown variant", "unknown value"),
+    ("EOF while parsing", "it ends inside"),
+    ("expected ident", "expected true, false or null"),
 ];
 /// Longest name or path in a study or effect file, in characters.
 const LONGEST: usize = 1000;
@@ -81,7 +81,10 @@ fn short_numbers(text: &str) -> String {
     let is_part = |c: char| c.is_alphanumeric() || matches!(c, '.' | '_');
     let short = |word: &str| -> Option<String> {
         let digits = word.bytes().filter(u8::is_ascii_digit).count();
-        let value: f64 = word.parse().ok().filter(|_| digits > DIGITS)?;
+        let value: f64 = word.parse().ok().filter(|_| digits > 8)?;
+        // Counts are exact.
+        let is_count = digits == word.len() && value < 1e15;
+        let value = (!is_count).then_some(value)?;
         Some(number(six_digits(value)))
     };
     let mut all = String::with_capacity(text.len());
@@ -169,7 +172,7 @@ mod tests {
             "0".repeat(300)
         );
         assert_eq!(message(&long), "found `1e308`, 1e-301 in a_123456789");
-        assert_eq!(message("row 12345678, 0.25"), "row 12345678, 0.25");
+        assert_eq!(message("536870912 of 0.25"), "536870912 of 0.25");
         assert_eq!(quoted("t\u{feff}1\u{a0}0"), "t\\u{feff}1\\u{a0}0");
     }
 

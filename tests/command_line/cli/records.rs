@@ -379,6 +379,6 @@ fn rows_are_counted_as_an_editor_counts_lines() {
     let outlying = format!("output y has outlying values in rows {line}:");
     assert!(text.contains(&outlying), "{text}");
     let warning = String::from_utf8(truetwin(&["fit", &record, "--twin", "tanks"]).stderr);
-    let expected = format!("spaced.csv, row {line}, column y: 1000000000.0 is an outlier");
+    let expected = format!("spaced.csv, row {line}, column y: 1e9 is an outlier");
     assert!(warning.unwrap().contains(&expected), "{expected}");
 }
