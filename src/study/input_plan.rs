@@ -122,6 +122,9 @@ impl PlannedInputs {
             Self::Alike { hold: 0, .. } => {
                 return Err("hold = 0; a level is held for at least 1 sample".into());
             }
+            Self::Alike { levels, .. } if !levels.is_finite() => {
+                return Err(wrong_ends(&[levels.low(), levels.high()]));
+            }
             Self::Alike { .. } | Self::File(_) => return Ok(()),
             Self::Each(plans) => plans,
         };
@@ -162,7 +165,7 @@ fn wrong_ends(ends: &[f64]) -> String {
     let given: Vec<String> = ends.iter().take(4).map(|end| number(*end)).collect();
     let more = if ends.len() > 4 { ", …" } else { "" };
     format!(
-        "invalid levels [{}{more}]; write levels = [low, high] with low < high",
+        "invalid levels [{}{more}]; write levels = [low, high] with low < high and a finite width",
         given.join(", ")
     )
 }
@@ -195,9 +198,10 @@ impl TryFrom<Vec<f64>> for Ends {
 
     fn try_from(ends: Vec<f64>) -> Result<Self, String> {
         match ends[..] {
-            [low, high] => Interval::new(low, high)
+            [low, high] => (Interval::new(low, high).ok())
+                .filter(|levels| levels.is_finite())
                 .map(Self)
-                .map_err(|_| wrong_ends(&ends)),
+                .ok_or_else(|| wrong_ends(&ends)),
             _ => Err(wrong_ends(&ends)),
         }
     }

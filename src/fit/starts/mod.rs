@@ -32,7 +32,9 @@ pub(crate) fn thorough(
     initial: &[Vec<f64>],
     noise: Noise,
 ) -> Result<Vec<Fitted>, FilterError> {
-    let initial = [initial, &spectral_starts(problem)].concat();
+    let sketch = sketch(problem);
+    let spectral = spectral_starts(sketch.as_ref().unwrap_or(problem));
+    let initial = [initial, &spectral].concat();
     search(problem, &initial, noise, ITERATIONS, Care::Thorough)
 }
 
