@@ -14,7 +14,7 @@ fn bad_files_are_refused_in_one_line() {
         ),
         (
             format!("{bias}\n{bias}colour = 1\n"),
-            vec!["line 5", "colour", "magnitudes"],
+            vec!["line 8", "colour", "magnitudes"],
         ),
         (format!("{bias}from = \"h1\"\n"), vec!["from"]),
         ("[[effekt]]\n".into(), vec!["line 1", "effekt", "effect"]),
