@@ -354,7 +354,7 @@ fn what_says_nothing_is_refused_with_its_remedy() {
         ),
         (
             format!("simulate --twin van-der-pol {theta} --effect late.toml"),
-            &["late.toml, line 8"],
+            &["late.toml, line 9"],
         ),
         (
             format!("simulate --study digits.toml {theta}"),
