@@ -198,10 +198,9 @@ impl TryFrom<Vec<f64>> for Ends {
 
     fn try_from(ends: Vec<f64>) -> Result<Self, String> {
         match ends[..] {
-            [low, high] => (Interval::new(low, high).ok())
-                .filter(|levels| levels.is_finite())
+            [low, high] => Interval::new(low, high)
                 .map(Self)
-                .ok_or_else(|| wrong_ends(&ends)),
+                .map_err(|_| wrong_ends(&ends)),
             _ => Err(wrong_ends(&ends)),
         }
     }
