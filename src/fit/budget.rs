@@ -259,13 +259,12 @@ impl FitStages {
 
     /// Returns what work finds that no answer can do without: it goes on whoever asks.
     pub fn whole<T>(&self, work: impl FnOnce() -> T) -> T {
-        if self.gives_partial {
-            self.passes.go_on();
+        if !self.gives_partial || self.is_cut {
+            return work();
         }
+        self.passes.go_on();
         let found = work();
-        if !self.is_cut {
-            self.passes.ask();
-        }
+        self.passes.ask();
         found
     }
 

@@ -36,6 +36,13 @@ impl Fitted {
             None => vec![f64::NAN; slopes.len()],
         }
     }
+
+    /// Square of the distance to another end, in standard deviations of this one.
+    pub fn squared_distance(&self, problem: &Problem, other: &Self) -> f64 {
+        let phi = |fit: &Self| DVector::from_vec(problem.coordinates.of(&fit.theta));
+        let off = phi(other) - phi(self);
+        off.dot(&(&self.information * &off))
+    }
 }
 
 /// Damped Fisher scoring from one start, within the bounds; `None` where the filter does not work at the start.

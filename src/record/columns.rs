@@ -66,10 +66,7 @@ impl Columns {
         let names = (header.iter().zip(given).enumerate())
             .map(|(at, (column, given))| {
                 if self.0.values().any(|asked| asked == column) && header[..at].contains(column) {
-                    return Err(format!(
-                        "column \"{}\" appears twice; rename or remove one",
-                        quoted(column)
-                    ));
+                    return Err(appears_twice(column));
                 }
                 if given.is_some() {
                     return Ok(given);
@@ -196,6 +193,14 @@ impl Wanted<'_> {
     }
 }
 
+/// The error of a column whose name another one has.
+fn appears_twice(column: &str) -> String {
+    format!(
+        "column \"{}\" appears twice; rename or remove one",
+        quoted(column)
+    )
+}
+
 /// The usual name of each column by its first letter, in the order of the file; other columns as they are.
 fn by_letter(header: &[&str]) -> Result<Vec<Option<String>>, String> {
     let count = |letter: char| {
@@ -209,8 +214,7 @@ fn by_letter(header: &[&str]) -> Result<Vec<Option<String>>, String> {
     (header.iter().enumerate())
         .map(|(at, column)| {
             if header[..at].contains(column) {
-                let column = quoted(column);
-                return Err(format!("column \"{column}\" appears twice; remove one"));
+                return Err(appears_twice(column));
             }
             let usual = match column.chars().next().filter(|_| is_usual(column)) {
                 Some('u') => inputs.next(),
@@ -228,10 +232,7 @@ fn input_column(header: &[&str], names: &[&str], own: &str) -> Result<usize, Str
     if let Some(at) = names.iter().find_map(at) {
         return match header[at + 1..].contains(&header[at]) {
             false => Ok(at),
-            true => Err(format!(
-                "column \"{}\" appears twice; rename or remove one",
-                quoted(header[at])
-            )),
+            true => Err(appears_twice(header[at])),
         };
     }
     let is_output = |column: &str| is_usual(column) && column.starts_with('y');

@@ -191,8 +191,8 @@ impl Record {
     ///
     /// The file exists, or cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), RecordError> {
-        write_new(path, record_csv_text(self).as_bytes())
-            .map_err(|error| RecordError::io(path, error))
+        let names = columns(self.drive().inputs().ncols(), self.outputs().ncols());
+        self.write_named(path, &names)
     }
 
     /// As [`write`](Self::write), with names of the columns: time, inputs, outputs.
@@ -203,8 +203,7 @@ impl Record {
 
     /// As [`write`](Self::write), for a twin with these channels: its reader tells them apart.
     pub(crate) fn write_for(&self, path: &Path, signals: &Signals) -> Result<(), RecordError> {
-        write_new(path, twin_csv_text(self, signals).as_bytes())
-            .map_err(|error| RecordError::io(path, error))
+        self.write_named(path, &header(signals, true))
     }
 }
 

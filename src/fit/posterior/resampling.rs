@@ -94,12 +94,10 @@ pub(crate) fn posterior(
 
 /// Ends of searches that are tops of their own, best first.
 fn tops<'a>(problem: &Problem, fits: &'a [Fitted]) -> Vec<&'a Fitted> {
-    let c = &problem.coordinates;
     let mut tops: Vec<&Fitted> = vec![];
     for fit in fits {
         let is_apart = |top: &&Fitted| {
-            let off = DVector::from_vec(c.of(&fit.theta)) - DVector::from_vec(c.of(&top.theta));
-            off.dot(&(&top.information * &off)) > BUDGET.tops_apart * BUDGET.tops_apart
+            top.squared_distance(problem, fit) > BUDGET.tops_apart * BUDGET.tops_apart
         };
         if fit.objective > fits[0].objective - BUDGET.counting_top && tops.iter().all(is_apart) {
             tops.push(fit);

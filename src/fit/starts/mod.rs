@@ -14,7 +14,6 @@ use crate::fit::climb::{Fitted, climb};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
-use nalgebra::DVector;
 use rayon::prelude::*;
 
 /// Starts of a search.
@@ -228,10 +227,8 @@ fn ends(
 
 /// Returns whether two searches have found the same top at the same place.
 fn is_one_top(problem: &Problem, one: &Fitted, other: &Fitted) -> bool {
-    let c = &problem.coordinates;
-    let off = DVector::from_vec(c.of(&one.theta)) - DVector::from_vec(c.of(&other.theta));
     (one.objective - other.objective).abs() <= BUDGET.same_top
-        && off.dot(&(&other.information * &off)) <= 1.0
+        && other.squared_distance(problem, one) <= 1.0
 }
 
 /// Does work once for all items that are the same, on all cores; returns what it finds for each item.
