@@ -195,7 +195,12 @@ pub mod fuzzing {
     }
     /// Work folders.
     pub mod work {
-        pub use crate::storage::fuzzing::*;
+        use crate::storage::{StorageError, work::WorkFolder};
+
+        /// Reads the manifest of a folder that `verb` is said to have made.
+        pub fn manifest(folder: &std::path::Path, verb: &'static str) -> Result<(), StorageError> {
+            WorkFolder::find(folder, verb).map(|_| ())
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! All effects that a program knows, where in a twin each can stand, and files of them.
+//! All effects that a program knows, and where in a twin each can stand.
 
 use super::check::targets;
 use super::key::EffectPattern;
@@ -6,10 +6,7 @@ use super::kind::{EffectKind, OtherState};
 use super::library;
 use super::placed::{Effect, EffectEntry};
 use crate::setting::did_you_mean;
-use crate::storage::untrusted::{check_names, message, read_text};
 use crate::twin::{Composed, Outline, ParameterSpace, Role, Twin, TwinError, is_memory};
-use serde::Deserialize;
-use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
@@ -125,83 +122,6 @@ fn rates(twin: &Composed) -> Vec<(String, String)> {
         .collect()
 }
 
-/// Longest effect file, in bytes: thousands of effects.
-const LARGEST_FILE: u64 = 1 << 20;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct EffectFile {
-    #[serde(default)]
-    effect: Vec<toml::Spanned<toml::Value>>,
-}
-
-#[derive(Deserialize)]
-struct EffectEntries {
-    #[expect(dead_code, reason = "read for the place of what is wrong")]
-    effect: Vec<EffectEntry>,
-}
-
-impl Catalogue {
-    /// Reads effects from the text of a file.
-    ///
-    /// Targets and magnitudes are checked when the effects are added to a twin.
-    pub fn parse(&self, text: &str) -> Result<Vec<Effect>, TwinError> {
-        self.parse_file(text, Path::new("effects"))
-    }
-
-    /// Reads effects from a file.
-    pub fn read(&self, path: &Path) -> Result<Vec<Effect>, TwinError> {
-        let text = read_text(path, LARGEST_FILE).map_err(|error| TwinError::EffectFile {
-            path: path.into(),
-            error: error.to_string(),
-        })?;
-        let effects = self.parse_file(&text, path)?;
-        match effects.is_empty() {
-            true => Err(TwinError::EffectText {
-                path: path.into(),
-                line: 1,
-                problem: "no effect; give it one with id and target".into(),
-            }),
-            false => Ok(effects),
-        }
-    }
-
-    fn parse_file(&self, text: &str, path: &Path) -> Result<Vec<Effect>, TwinError> {
-        if let Ok(table) = toml::from_str(text) {
-            check_names(&table).map_err(|problem| TwinError::EffectText {
-                path: path.into(),
-                line: 1,
-                problem,
-            })?;
-        }
-        let at = |byte: usize, problem: &str| {
-            let lines = problem.lines().map(str::trim);
-            let lines: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
-            TwinError::EffectText {
-                path: path.into(),
-                line: 1 + text.bytes().take(byte).filter(|b| *b == b'\n').count(),
-                problem: message(&lines.join(", ")),
-            }
-        };
-        let file: EffectFile = toml::from_str(text)
-            .map_err(|error| at(error.span().map_or(0, |span| span.start), error.message()))?;
-        (file.effect.into_iter())
-            .map(|table| {
-                // Each effect for itself: an error inside then points at its own [[effect]].
-                let start = table.span().start;
-                let entry = EffectEntry::deserialize(table.into_inner()).map_err(|error| {
-                    // A table on its own has lost the places of its values.
-                    let whole = toml::from_str::<EffectEntries>(text).err();
-                    let value = whole.and_then(|error| error.span());
-                    at(value.map_or(start, |value| value.start), error.message())
-                })?;
-                self.resolve(&entry)
-                    .map_err(|error| at(start, &error.to_string()))
-            })
-            .collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,21 +140,6 @@ mod tests {
         let effects = catalogue.applicable(twin).into_iter();
         let magnets = effects.filter(|e| e.id() == "magnet");
         magnets.map(|e| e.key().to_string()).collect()
-    }
-
-    #[test]
-    fn what_is_no_table_is_told_what_to_be() {
-        let error = Catalogue::default().parse("effect = [3]").unwrap_err();
-        let told = error.to_string();
-        assert!(
-            told.contains("expected a table with id and target"),
-            "{told}"
-        );
-        let first = "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n";
-        let text = format!("{first}{first}error = 'x'\n");
-        let told = Catalogue::default().parse(&text).unwrap_err().to_string();
-        assert!(told.contains("line 7"), "{told}");
-        assert!(Catalogue::default().parse("# none\n").unwrap().is_empty());
     }
 
     #[test]

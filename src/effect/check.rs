@@ -96,7 +96,8 @@ fn check_place(
     Ok(())
 }
 
-fn check_given(effect: &Effect) -> Result<(), TwinError> {
+/// Checks that an effect has the magnitudes that it is given, within their limits.
+pub(super) fn check_given(effect: &Effect) -> Result<(), TwinError> {
     let declared = effect.magnitudes();
     for (name, &value) in effect.all_given() {
         let problem = match declared.iter().find(|m| m.name == name.as_str()) {

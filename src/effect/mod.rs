@@ -16,6 +16,7 @@
 mod augment;
 mod catalogue;
 mod check;
+mod file;
 mod key;
 mod kind;
 mod law;
@@ -28,6 +29,7 @@ pub use augment::augment;
 pub(crate) use augment::augment_late;
 pub use catalogue::Catalogue;
 pub(crate) use check::targets;
+pub(crate) use file::line_of_effect;
 pub use key::{EffectKey, EffectPattern};
 pub use kind::{EffectKind, OtherState};
 pub use law::ForcePoint;

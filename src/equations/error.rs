@@ -1,5 +1,6 @@
 //! The error of a twin as text.
 
+use crate::storage::untrusted::line;
 use std::path::{Path, PathBuf};
 
 /// A fault in the text of a twin: where it is, the word there, and the remedy.
@@ -37,7 +38,7 @@ impl EquationsError {
         let column = before[start..].iter().filter(|b| (**b & 0xc0) != 0x80);
         Self {
             path: None,
-            line: 1 + before.iter().filter(|b| **b == b'\n').count(),
+            line: line(text, byte),
             column: 1 + column.count(),
             problem: problem.into(),
         }

@@ -8,7 +8,9 @@ use super::follow::{FollowedRecords, steps_taken, swallowed};
 use super::outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue,
 };
-use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
+use super::posterior::{
+    DrawsWanted, FitIntervals, PosteriorRegion, PosteriorSample, posterior, table,
+};
 use super::problem::Problem;
 use super::profile::{Profile, ProfilesOf, profiles};
 use super::searched::Searched;
@@ -48,7 +50,8 @@ pub(crate) fn run(
     let draws = match problem.is_simulated() && asked.is_none() {
         true => PosteriorSample::default(),
         false => stages.of(PosteriorSample::default(), || {
-            drawn(&problem, &mut fits, asked, noise)
+            let wanted = asked.map_or(DrawsWanted::Usual, DrawsWanted::Asked);
+            drawn(&problem, &mut fits, wanted, noise)
         })?,
     };
     let Some((fitted, certificate)) =
@@ -160,10 +163,10 @@ fn stated(
 fn drawn(
     problem: &Problem,
     fits: &mut Vec<Fitted>,
-    asked: Option<usize>,
+    wanted: DrawsWanted,
     noise: Noise,
 ) -> Result<PosteriorSample, FilterError> {
-    let draws = followed(problem, fits, asked, noise.child("posterior"))?;
+    let draws = followed(problem, fits, wanted, noise.child("posterior"))?;
     if problem.is_simulated() || agreeing(fits) > 1 {
         return Ok(draws);
     }
@@ -171,7 +174,7 @@ fn drawn(
     let more = noise.child("more searches");
     *fits = agreed(problem, fits.clone(), more, ITERATIONS)?;
     match fits.first().map(|fit| fit.objective) > best {
-        true => followed(problem, fits, asked, noise.child("posterior")),
+        true => followed(problem, fits, wanted, noise.child("posterior")),
         false => Ok(draws),
     }
 }
@@ -181,10 +184,10 @@ fn drawn(
 fn followed(
     problem: &Problem,
     fits: &mut Vec<Fitted>,
-    asked: Option<usize>,
+    wanted: DrawsWanted,
     noise: Noise,
 ) -> Result<PosteriorSample, FilterError> {
-    let mut draws = posterior(problem, fits, asked, noise)?;
+    let mut draws = posterior(problem, fits, wanted, noise)?;
     for _ in 0..BUDGET.restarts_from_draws {
         let Some(better) = draws.better.take() else {
             break;
@@ -195,7 +198,7 @@ fn followed(
         for fit in polish(problem, vec![fit], ITERATIONS)? {
             fits.insert(0, fit);
         }
-        draws = posterior(problem, fits, asked, noise)?;
+        draws = posterior(problem, fits, wanted, noise)?;
     }
     Ok(draws)
 }

@@ -12,7 +12,6 @@
 pub(crate) mod checksum;
 mod error;
 pub(crate) mod files;
-pub(crate) mod fuzzing;
 mod names;
 pub(crate) mod place;
 pub(crate) mod reading;

@@ -1,12 +1,12 @@
 //! The study file: a twin in the user's own setting.
 
-use crate::effect::EffectEntry;
+use crate::effect::{EffectEntry, line_of_effect};
 use crate::equations::{self, Equations};
 use crate::feature::FeatureRecipe;
 use crate::record::UNIFORM;
 use crate::setting::number;
 use crate::storage::files::folder;
-use crate::storage::untrusted::{check_names, message, read_text};
+use crate::storage::untrusted::{check_names, line, message, read_text};
 use crate::study::error::StudyError;
 use crate::study::noise_table::NoiseTable;
 use crate::study::plan::grid_of_files;
@@ -254,38 +254,6 @@ fn line_of_value(text: &str, table: &str, name: &str) -> Option<usize> {
     Some(line(text, value.unwrap_or(table).span().start))
 }
 
-/// Returns the line of the value that `error` is about in effect `index` of a text; none where that is not `entry`, since a caller may
-/// have changed the effects.
-fn line_of_effect(
-    text: &str,
-    index: usize,
-    entry: &EffectEntry,
-    error: &TwinError,
-) -> Option<usize> {
-    let file = DeTable::parse(text).ok()?;
-    let table = file
-        .get_ref()
-        .get("effect")?
-        .get_ref()
-        .get(index)?
-        .get_ref();
-    let is = |key, name: &str| {
-        let value = table.get(key).and_then(|value| value.get_ref().as_str());
-        value == Some(name)
-    };
-    if !is("id", &entry.id) || !is("target", &entry.target) {
-        return None;
-    }
-    let value = match error {
-        TwinError::Effect { key, .. } => match key.as_str() {
-            key @ ("id" | "target" | "from" | "to") => table.get(key),
-            name => (table.get("magnitudes")).and_then(|all| all.get_ref().get(name)),
-        },
-        _ => None,
-    };
-    Some(line(text, value.or(table.get("id"))?.span().start))
-}
-
 /// Returns how many lines below the first one of a table the key stands that a message is about, of which the parser tells the table alone:
 /// `k1: …` or ``… `blobs` …``.
 fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
@@ -299,11 +267,6 @@ fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
         rest.is_some_and(|rest| rest.trim_start().starts_with('='))
     };
     of_table.position(is_key).map_or(0, |below| 1 + below)
-}
-
-/// Returns the line, from 1, of a byte of a text.
-fn line(text: &str, byte: usize) -> usize {
-    1 + text.bytes().take(byte).filter(|b| *b == b'\n').count()
 }
 
 #[cfg(test)]

@@ -114,15 +114,28 @@ fn wrong_calls_are_refused_with_the_remedy() {
 fn banks_that_are_not_what_they_say_are_refused() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
-    done(at, "bank --twin van-der-pol --size 40 --out bank");
+    done(at, "bank --twin van-der-pol --size 120 --out bank");
     done(at, "merge bank --out bank.csv");
     let csv = std::fs::read_to_string(at.join("bank.csv")).unwrap();
     let (head, rows) = csv.split_once('\n').unwrap();
     let (_, others) = rows.split_once(',').unwrap();
-    std::fs::write(at.join("far.csv"), format!("{head}\n1e5,{others}")).unwrap();
     let train = "pretrain --twin van-der-pol --epochs 1 --out x.est --bank";
+    // Rows as an editor counts them, blank lines included.
+    std::fs::write(at.join("far.csv"), format!("{head}\n\n1e5,{others}")).unwrap();
     let said = refused(at, &format!("{train} far.csv"));
-    assert!(said.contains("far.csv: theta, row 1: nu = "), "{said}");
+    assert!(said.contains("far.csv: no bank (row 3: nu = "), "{said}");
+    let narrow = |line: &str| {
+        line.rsplit_once(',')
+            .map_or("", |(start, _)| start)
+            .to_owned()
+    };
+    let lines: Vec<String> = csv.lines().map(narrow).collect();
+    std::fs::write(at.join("narrow.csv"), lines.join("\n") + "\n").unwrap();
+    let said = refused(at, &format!("{train} narrow.csv"));
+    assert!(
+        said.contains("narrow.csv: ") && said.contains("features"),
+        "{said}"
+    );
 
     let path = at.join("bank/manifest.json");
     let mut manifest: serde_json::Value =

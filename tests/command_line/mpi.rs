@@ -2,6 +2,7 @@
 //!
 //! Without `mpirun` these tests say that they skipped, unless `TRUETWIN_MPI=required`.
 
+use crate::cli::few_effects;
 use crate::files::files;
 use crate::timeless::timeless;
 use serde_json::Value;
@@ -157,6 +158,7 @@ fn ranks_share_records_and_trials() {
         return;
     }
     let place = tempfile::tempdir().unwrap();
+    let few = few_effects(place.path());
     let calls: [(&str, &[&str]); 2] = [
         (
             "reproduce.json",
@@ -176,8 +178,8 @@ fn ranks_share_records_and_trials() {
             "scorecard.json",
             &[
                 "withheld",
-                "--twin",
-                "van-der-pol",
+                "--study",
+                &few,
                 "--trials",
                 "4",
                 "--kinds",

@@ -250,8 +250,9 @@ fn leftovers_of_killed_runs_are_removed_by_the_next() {
 #[test]
 fn leftovers_in_a_folder_of_trials_are_removed_by_the_next_run() {
     let place = tempfile::tempdir().unwrap();
+    crate::stop::short(place.path());
     let trials =
-        "withheld --twin van-der-pol --trials 1 --kinds none --detection-only --out trials";
+        "withheld --study short.toml --trials 1 --kinds none --detection-only --out trials";
     assert!(run(place.path(), trials).status.success());
     let parts = [".", "trials", "trials/records", "trials/answers"];
     for part in parts {

@@ -18,9 +18,10 @@ fn start(folder: &Path, arguments: &str) -> std::process::Child {
         .unwrap()
 }
 
-/// A study of short records.
+/// A study of short records and few effects.
 pub fn short(folder: &Path) {
-    let study = "twin = 'van-der-pol'\n[record]\nsamples = 100\n";
+    let study = "twin = 'van-der-pol'\n[record]\nsamples = 100\n\
+                 [library]\nonly = ['sensor-bias', 'sensor-gain', 'linear-loss']\n";
     fs::write(folder.join("short.toml"), study).unwrap();
 }
 

@@ -4,7 +4,7 @@ use crate::cli::options::seconds;
 use crate::cli::prelude::*;
 use crate::estimator::bank::{Bank, file};
 use crate::estimator::shards::{BankPlan, ShardedBank};
-use crate::estimator::{PretrainOptions, Pretraining, Project};
+use crate::estimator::{EstimatorError, PretrainOptions, Pretraining, Project};
 use crate::storage::work::checksum;
 use std::time::{Duration, Instant};
 
@@ -62,7 +62,11 @@ impl Verb for Pretrain {
             every: self.checkpoint,
             ..Pretraining::new(&project, settings)
         };
-        let (estimator, history) = pretraining.write(&self.out, context.progress)?;
+        let written = pretraining.write(&self.out, context.progress);
+        let (estimator, history) = written.map_err(|error| match (error, given) {
+            (EstimatorError::Bank(problem), Some(path)) => EstimatorError::file(path, problem),
+            (error, _) => error,
+        })?;
         let seconds = clock.elapsed().as_secs_f64();
         let bank = estimator.settings().bank_size;
         let loss = history.training.last().copied().unwrap_or(f64::NAN);
@@ -92,14 +96,7 @@ fn bank(
     settings: &PretrainOptions,
 ) -> Result<(Box<dyn Bank>, String), Failure> {
     if file::is_named(path) {
-        let space = project.study().twin().parameters();
-        let bank = file::read(path, &space.names())?;
-        for (row, theta) in bank.theta.rows().into_iter().enumerate() {
-            space.check_point(&theta.to_vec()).map_err(|error| {
-                let (path, row) = (path.display(), row + 1);
-                Failure::user(format!("{path}: theta, row {row}: {error}"))
-            })?;
-        }
+        let bank = file::read(path, &project.study().twin().parameters())?;
         return Ok((Box::new(bank), checksum(path)?));
     }
     let bank = ShardedBank::open(path)?;

@@ -14,12 +14,13 @@ use crate::estimator::error::EstimatorError;
 use crate::storage::files::write_new;
 use crate::storage::reading::{Reading, note_whole, open};
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt};
+use crate::twin::ParameterSpace;
 use ndarray::Array2;
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
 /// Remedy for a file from elsewhere.
-const GIVE: &str = "give theta (rows × parameters) and features (rows × features), one simulation a row, all finite";
+const GIVE: &str = "give theta (rows × parameters, within their bounds) and features (rows × features), one simulation a row, all finite";
 
 fn extension(path: &Path) -> &str {
     (path.extension().and_then(|e| e.to_str())).unwrap_or_default()
@@ -70,7 +71,7 @@ fn write_bytes(path: &Path, bytes: io::Result<Vec<u8>>) -> Result<(), EstimatorE
 }
 
 /// Reads a file in the form that its name ends with, of a twin with these parameters.
-pub fn read(path: &Path, names: &[&str]) -> Result<Draws, EstimatorError> {
+pub fn read(path: &Path, space: &ParameterSpace) -> Result<Draws, EstimatorError> {
     if !is_named(path) {
         return Err(other_form(path));
     }
@@ -80,13 +81,15 @@ pub fn read(path: &Path, names: &[&str]) -> Result<Draws, EstimatorError> {
             let file = open(path).map_err(unread)?;
             let draws = from_npz(io::BufReader::new(&file));
             note_whole(path, &file).map_err(unread)?;
-            draws
+            draws.and_then(|draws| {
+                check(&draws, space.len())?;
+                check_points(&draws.theta, space)?;
+                Ok(draws)
+            })
         }
-        _ => from_csv(Reading::open(path).map_err(unread)?, names),
+        _ => from_csv(Reading::open(path).map_err(unread)?, space),
     };
-    draws
-        .and_then(|draws| check(&draws, names.len()).map(|()| draws))
-        .map_err(|reason| EstimatorError::no_bank(path, &reason, GIVE))
+    draws.map_err(|reason| EstimatorError::no_bank(path, &reason, GIVE))
 }
 
 /// Checks whether the rows are whole, finite, and of so many parameters.
@@ -108,6 +111,15 @@ pub(crate) fn check(draws: &Draws, parameters: usize) -> Result<(), String> {
                 column + 1
             ));
         }
+    }
+    Ok(())
+}
+
+/// Checks that the parameters of every row lie within their bounds.
+fn check_points(theta: &Array2<f64>, space: &ParameterSpace) -> Result<(), String> {
+    for (row, theta) in theta.rows().into_iter().enumerate() {
+        (space.check_point(&theta.to_vec()))
+            .map_err(|error| format!("theta, row {}: {error}", row + 1))?;
     }
     Ok(())
 }
@@ -161,9 +173,9 @@ impl<R: Read> Read for WithEnd<R> {
 }
 
 /// Rows of a CSV file. A last line without an end may be cut within a number, which nothing else would tell.
-fn from_csv(from: impl Read, names: &[&str]) -> Result<Draws, String> {
+fn from_csv(from: impl Read, space: &ParameterSpace) -> Result<Draws, String> {
     let mut file = WithEnd { from, last: b'\n' };
-    let draws = rows_of_csv(&mut file, names)?;
+    let draws = rows_of_csv(&mut file, space)?;
     match file.last {
         b'\n' | b'\r' => Ok(draws),
         _ => Err(format!(
@@ -183,10 +195,10 @@ fn told(error: &csv::Error, line: usize) -> String {
     }
 }
 
-fn rows_of_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
+fn rows_of_csv(file: impl Read, space: &ParameterSpace) -> Result<Draws, String> {
     let mut csv = Rows::new(file);
     let found = csv.header().map_err(|error| error.to_string())?;
-    let d = names.len();
+    let (names, d) = (&space.names(), space.len());
     let n = found.len().saturating_sub(d);
     if n == 0 || !found.iter().eq(header(names, n).iter()) {
         return Err(format!("the header is not {},x1,x2,…", names.join(",")));
@@ -213,6 +225,8 @@ fn rows_of_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
                 format!("row {line}, column {}: \"{cell}\" is no number", column + 1)
             })?);
         }
+        (space.check_point(&values[0][rows * d..]))
+            .map_err(|error| format!("row {line}: {error}"))?;
         rows += 1;
     }
     let [theta, features] = values;
@@ -229,6 +243,7 @@ fn rows_of_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::twin::Parameter;
     use ndarray::array;
     use std::fs::File;
 
@@ -242,13 +257,18 @@ mod tests {
 
     const NAMES: [&str; 2] = ["a", "b"];
 
+    fn space() -> ParameterSpace {
+        let wide = |name| Parameter::new(name, "1", f64::MIN, f64::MAX);
+        ParameterSpace::new(NAMES.map(wide))
+    }
+
     #[test]
     fn every_bit_comes_back_from_both_forms() {
         let place = tempfile::tempdir().unwrap();
         for name in ["bank.npz", "bank.csv"] {
             let path = place.path().join(name);
             write(&path, &draws(), &NAMES).unwrap();
-            assert_eq!(read(&path, &NAMES).unwrap(), draws(), "{name}");
+            assert_eq!(read(&path, &space()).unwrap(), draws(), "{name}");
             let taken = write(&path, &draws(), &NAMES).unwrap_err();
             assert!(taken.to_string().contains("choose another"), "{taken}");
         }
@@ -279,7 +299,7 @@ mod tests {
             io::Write::write_all(&mut archive, &npy).unwrap();
         }
         archive.finish().unwrap();
-        let draws = read(&path, &NAMES).unwrap();
+        let draws = read(&path, &space()).unwrap();
         assert_eq!(draws.theta, array![[0.5, 2.0], [1.0, 3.0]]);
         assert_eq!(draws.features, draws.theta);
     }
@@ -319,7 +339,7 @@ mod tests {
         let refused = |name: &str, bytes: &[u8]| {
             let path = place.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            let error = read(&path, &NAMES).unwrap_err().to_string();
+            let error = read(&path, &space()).unwrap_err().to_string();
             assert!(
                 error.contains(name) && error.contains("give theta"),
                 "{error}"

@@ -7,7 +7,7 @@ mod rows;
 mod show;
 
 pub(crate) use rows::Rows;
-pub(crate) use show::{check_names, excerpt, hidden, message, one_line, printable, quoted};
+pub(crate) use show::{check_names, excerpt, hidden, line, message, one_line, printable, quoted};
 
 use super::reading::Reading;
 use std::io::{self, Read};

@@ -156,6 +156,11 @@ fn check_name(name: &str) -> Result<(), String> {
     }
 }
 
+/// Returns the line, from 1, of a byte of a text.
+pub(crate) fn line(text: &str, byte: usize) -> usize {
+    1 + text.bytes().take(byte).filter(|b| *b == b'\n').count()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

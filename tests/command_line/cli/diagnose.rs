@@ -198,7 +198,7 @@ fn an_unknown_effect_is_answered_with_the_known_ones() {
     ];
     refused(
         &[&simulate[..], &[&at("typo.toml")]].concat(),
-        &[&known[..], &["unknown effect id", "typo.toml, line 1"]].concat(),
+        &[&known[..], &["unknown effect id", "typo.toml, line 2"]].concat(),
     );
     refused(
         &["diagnose", &record, "--study", &at("study.toml")],

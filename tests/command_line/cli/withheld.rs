@@ -1,6 +1,6 @@
 //! `withheld` as a user meets it.
 
-use super::{done, json, refused};
+use super::{done, few_effects, json, refused};
 use std::fs;
 use std::path::Path;
 
@@ -10,11 +10,12 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
     let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     fs::create_dir_all(&place).unwrap();
     let out = place.join("trials").display().to_string();
+    let few = few_effects(&place);
     let call = |seed: &'static str| {
         [
             "withheld",
-            "--twin",
-            "van-der-pol",
+            "--study",
+            &few,
             "--trials",
             "2",
             "--kinds",
@@ -64,15 +65,7 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
         &words(&other),
         &["seed was 5, now it is 6", "choose another --out"],
     );
-    let strange = [
-        "withheld",
-        "--twin",
-        "van-der-pol",
-        "--trials",
-        "2",
-        "--out",
-        &out,
-    ];
+    let strange = ["withheld", "--study", &few, "--trials", "2", "--out", &out];
     refused(
         &[&strange[..], &["--kinds", "odd"]].concat(),
         &["there are none, outside"],
@@ -82,15 +75,7 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
         &["none of open, closed, all"],
     );
     refused(
-        &[
-            "withheld",
-            "--twin",
-            "van-der-pol",
-            "--trials",
-            "0",
-            "--out",
-            &out,
-        ],
+        &["withheld", "--study", &few, "--trials", "0", "--out", &out],
         &["at least 1"],
     );
     fs::remove_dir_all(place).unwrap();

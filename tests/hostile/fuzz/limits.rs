@@ -170,7 +170,7 @@ fn archives_that_are_bombs() {
     let bomb = archive.finish().unwrap().into_inner();
     assert!(bomb.len() < 200_000);
     let path = file(&place, "bomb.npz", &bomb);
-    let message = refused(MIB, || bank::read(&path, &["a", "b"]));
+    let message = refused(MIB, || bank::read(&path, &readers::ab()));
     assert!(message.contains("no array of NumPy"), "{message}");
     let size = (60 * MIB as u32).to_le_bytes();
     let mut lying = bomb;
@@ -178,7 +178,7 @@ fn archives_that_are_bombs() {
         lying[at..at + 4].copy_from_slice(&200u32.to_le_bytes());
     }
     let path = file(&place, "lying.npz", &lying);
-    refused(MIB, || bank::read(&path, &["a", "b"]));
+    refused(MIB, || bank::read(&path, &readers::ab()));
 }
 
 /// A manifest that speaks of a trillion shards costs nothing.

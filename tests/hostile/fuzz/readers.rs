@@ -20,7 +20,7 @@ use truetwin::network::layers::*;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record};
 use truetwin::study::{RecordPlan, Study, StudyFile};
-use truetwin::twin::Noise;
+use truetwin::twin::{Noise, Parameter, ParameterSpace};
 use truetwin::twins::VanDerPol;
 
 /// Reader of bytes: `Ok`, or the message that a user would see.
@@ -230,6 +230,11 @@ pub fn piece(data: &[u8]) -> Result<(), String> {
     runs::run(&place().join("work"), data).map_err(text)
 }
 
+/// Parameters a and b of any value.
+pub fn ab() -> ParameterSpace {
+    ParameterSpace::new(["a", "b"].map(|name| Parameter::new(name, "1", f64::MIN, f64::MAX)))
+}
+
 /// A bank in one file: an archive, an array that is put into one, or a table.
 pub fn bank(data: &[u8]) -> Result<(), String> {
     let path = match data {
@@ -237,7 +242,7 @@ pub fn bank(data: &[u8]) -> Result<(), String> {
         [0x93, b'N', ..] => file("bank.npz", &archive(data)),
         _ => file("bank.csv", data),
     };
-    banks::read(&path, &["a", "b"]).map(|_| ()).map_err(text)
+    banks::read(&path, &ab()).map(|_| ()).map_err(text)
 }
 
 /// An archive with sound `theta` and these bytes as `features`.

@@ -5,9 +5,13 @@ use crate::study::{RecordPlan, StudyFile};
 use crate::twins::VanDerPol;
 use std::fs;
 
-/// Short records: what is tested is the order of work.
+/// Short records and few effects: what is tested is the order of work.
 fn oscillator() -> Study {
-    Study::new("van-der-pol", VanDerPol, RecordPlan::autonomous(0.05, 120)).unwrap()
+    let study = Study::new("van-der-pol", VanDerPol, RecordPlan::autonomous(0.05, 120)).unwrap();
+    let text = "twin = 'van-der-pol'\n[library]\n\
+                only = ['sensor-bias', 'sensor-gain', 'coulomb-friction', 'linear-loss']";
+    let file = StudyFile::parse(text, Path::new("s.toml")).unwrap();
+    study.configure(&file).unwrap()
 }
 
 fn two() -> TrialSettings {
