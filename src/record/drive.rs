@@ -25,7 +25,8 @@ pub struct Drive {
     dt: f64,
     /// Time of the first row on the record's own clock, in seconds.
     first_time: f64,
-    inputs: Signal,
+    /// Shared by copies: a fit hands its records on many times.
+    inputs: Arc<Signal>,
     /// Times on the record's own clock, one a row, where steps vary.
     times: Option<Arc<[f64]>>,
     /// The file that the rows were read from, for messages.
@@ -50,7 +51,7 @@ impl Drive {
         Ok(Self {
             dt,
             first_time: 0.0,
-            inputs,
+            inputs: Arc::new(inputs),
             times: None,
             rows: FileRows::default(),
         })
@@ -78,7 +79,7 @@ impl Drive {
         if times.len() < 2 {
             return Err(RecordError::Empty);
         }
-        let mut steps = vec![];
+        let mut steps = 0_u32;
         for (k, pair) in times.windows(2).enumerate() {
             let step = pair[1] - pair[0];
             // Also where a time is NaN.
@@ -96,18 +97,20 @@ impl Drive {
             if !step.is_normal() {
                 return Err(RecordError::Step(step));
             }
-            steps.push(step);
+            steps += 1;
         }
-        if steps.is_empty() {
+        if steps == 0 {
             return Err(RecordError::OneTime(times[0]));
         }
         let (first, last) = (times[0], times[times.len() - 1]);
-        let dt = (last - first) / steps.len() as f64;
-        let is_repeated = steps.len() + 1 < times.len();
+        let dt = (last - first) / f64::from(steps);
+        let is_repeated = steps as usize + 1 < times.len();
         let mut drive = Self::new(dt, inputs)?.beginning_at(first);
         let off = |(k, t): (usize, &f64)| (t - first - k as f64 * dt).abs() > UNIFORM * dt;
         if is_repeated || times.iter().enumerate().any(off) {
             drive.times = Some(times.into());
+            let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
+            let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
             let middle = (steps.len() - 1) / 2;
             drive.dt = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         }
@@ -157,7 +160,7 @@ impl Drive {
         Self {
             dt: self.dt,
             first_time: self.first_time,
-            inputs: self.inputs.slice(s![..rows, ..]).to_owned(),
+            inputs: Arc::new(self.inputs.slice(s![..rows, ..]).to_owned()),
             times: self.times.as_ref().map(|times| times[..rows].into()),
             rows: self.rows.clone(),
         }

@@ -6,7 +6,7 @@ use crate::math::six_digits;
 use crate::record::{Drive, Quantity, RecordError, Signal, Signals, step_of};
 use ndarray::{ArrayView2, s};
 use std::f64::consts::TAU;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Inputs and outputs measured on one time grid. An output that is NaN is missing: it was not measured.
 ///
@@ -21,7 +21,8 @@ use std::sync::OnceLock;
 #[derive(Debug, Clone)]
 pub struct Record {
     drive: Drive,
-    outputs: Signal,
+    /// Shared by copies.
+    outputs: Arc<Signal>,
     /// Least variances of the outputs, once they were asked for: see [`cells`](Self::cells).
     cells: OnceLock<Vec<f64>>,
 }
@@ -52,7 +53,7 @@ impl Record {
         }
         Ok(Self {
             drive,
-            outputs,
+            outputs: Arc::new(outputs),
             cells: OnceLock::new(),
         })
     }
@@ -187,7 +188,7 @@ impl Record {
     /// The same cells of other outputs emptied, as many rows and channels.
     pub(crate) fn with_gaps_in(&self, mut outputs: Signal) -> Signal {
         if outputs.dim() == self.outputs.dim() {
-            for (to, own) in outputs.iter_mut().zip(&self.outputs) {
+            for (to, own) in outputs.iter_mut().zip(self.outputs.iter()) {
                 if own.is_nan() {
                     *to = f64::NAN;
                 }
@@ -228,7 +229,7 @@ impl PartialEq for Record {
     fn eq(&self, other: &Self) -> bool {
         self.drive == other.drive
             && self.outputs.dim() == other.outputs.dim()
-            && (self.outputs.iter().zip(&other.outputs))
+            && (self.outputs.iter().zip(other.outputs.iter()))
                 .all(|(a, b)| a == b || (a.is_nan() && b.is_nan()))
     }
 }
