@@ -8,9 +8,7 @@ use super::follow::{FollowedRecords, steps_taken, swallowed};
 use super::outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue,
 };
-use super::posterior::{
-    DrawsWanted, FitIntervals, PosteriorRegion, PosteriorSample, posterior, table,
-};
+use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
 use super::problem::Problem;
 use super::profile::{Profile, ProfilesOf, profiles};
 use super::searched::Searched;
@@ -50,8 +48,7 @@ pub(crate) fn run(
     let draws = match problem.is_simulated() && asked.is_none() {
         true => PosteriorSample::default(),
         false => stages.of(PosteriorSample::default(), || {
-            let wanted = asked.map_or(DrawsWanted::Usual, DrawsWanted::Asked);
-            drawn(&problem, &mut fits, wanted, noise)
+            drawn(&problem, &mut fits, asked, noise)
         })?,
     };
     let Some((fitted, certificate)) =
@@ -163,10 +160,10 @@ fn stated(
 fn drawn(
     problem: &Problem,
     fits: &mut Vec<Fitted>,
-    wanted: DrawsWanted,
+    asked: Option<usize>,
     noise: Noise,
 ) -> Result<PosteriorSample, FilterError> {
-    let draws = followed(problem, fits, wanted, noise.child("posterior"))?;
+    let draws = followed(problem, fits, asked, noise.child("posterior"))?;
     if problem.is_simulated() || agreeing(fits) > 1 {
         return Ok(draws);
     }
@@ -174,7 +171,7 @@ fn drawn(
     let more = noise.child("more searches");
     *fits = agreed(problem, fits.clone(), more, ITERATIONS)?;
     match fits.first().map(|fit| fit.objective) > best {
-        true => followed(problem, fits, wanted, noise.child("posterior")),
+        true => followed(problem, fits, asked, noise.child("posterior")),
         false => Ok(draws),
     }
 }
@@ -184,10 +181,10 @@ fn drawn(
 fn followed(
     problem: &Problem,
     fits: &mut Vec<Fitted>,
-    wanted: DrawsWanted,
+    asked: Option<usize>,
     noise: Noise,
 ) -> Result<PosteriorSample, FilterError> {
-    let mut draws = posterior(problem, fits, wanted, noise)?;
+    let mut draws = posterior(problem, fits, asked, noise)?;
     for _ in 0..BUDGET.restarts_from_draws {
         let Some(better) = draws.better.take() else {
             break;
@@ -198,7 +195,7 @@ fn followed(
         for fit in polish(problem, vec![fit], ITERATIONS)? {
             fits.insert(0, fit);
         }
-        draws = posterior(problem, fits, wanted, noise)?;
+        draws = posterior(problem, fits, asked, noise)?;
     }
     Ok(draws)
 }

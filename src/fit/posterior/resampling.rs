@@ -26,33 +26,22 @@ pub(crate) struct PosteriorSample {
 }
 
 /// Number of draws whose time is that of a fit.
-fn usual(problem: &Problem) -> usize {
+pub(in crate::fit) fn usual(problem: &Problem) -> usize {
     (BUDGET.round_samples / problem.samples()).clamp(BUDGET.least_draws, BUDGET.most_draws)
 }
 
-/// Draws that are wanted of a posterior.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum DrawsWanted {
-    /// As many as fits need.
-    Usual,
-    /// The same for intervals: where weights are uneven, as many rounds as asked draws have. With fewer, deviations of a clipped record differ by
-    /// a seventh from one set of units to another.
-    Settled,
-    /// So many.
-    Asked(usize),
-}
-
-/// Draws of θ from the posterior of likelihood and weak priors within the bounds; `fits` are ends of searches, best first.
+/// `count` draws of θ, or as many as fits need, from the posterior of likelihood and weak priors within the bounds; `fits` are ends of
+/// searches, best first.
 ///
 /// Draws of Student densities about the tops are weighed by posterior over their mixture. Unless weights are even already, the weighted mean and
-/// covariance about each top propose other rounds, as directions that the records hardly know bend; draws are taken from the last in proportion
+/// covariance about each top propose a second round, as directions that the records hardly know bend; draws are taken from that in proportion
 /// to their weights.
 ///
 /// Source: Rubin, "Using the SIR algorithm to simulate posterior distributions" (1988).
 pub(crate) fn posterior(
     problem: &Problem,
     fits: &[Fitted],
-    wanted: DrawsWanted,
+    count: Option<usize>,
     noise: Noise,
 ) -> Result<PosteriorSample, FilterError> {
     let Some(best) = fits.first() else {
@@ -71,14 +60,10 @@ pub(crate) fn posterior(
     let mut proposals = first.clone();
     let mut round = Round::new(problem, &proposals, usual, &mut source, log_prior)?;
     let is_even = round.effective() >= BUDGET.even_weights * usual as f64;
-    let count = match wanted {
-        DrawsWanted::Asked(count) => count,
-        _ => usual,
-    };
-    let (rounds, size) = match wanted {
-        DrawsWanted::Usual | DrawsWanted::Settled if is_even => (0, usual),
-        DrawsWanted::Usual => (1, usual),
-        _ => (BUDGET.adaptations, usual.max(BUDGET.draws_each * count)),
+    let (rounds, size) = match count {
+        Some(count) => (BUDGET.adaptations, usual.max(BUDGET.draws_each * count)),
+        None if is_even => (0, usual),
+        None => (1, usual),
     };
     let mut better = (best.objective + BUDGET.better_draw, None);
     let mut look = |round: &Round| {
@@ -95,7 +80,7 @@ pub(crate) fn posterior(
         round = Round::new(problem, &proposals, size, &mut source, log_prior)?;
         look(&round);
     }
-    let taken = round.taken(count);
+    let taken = round.taken(count.unwrap_or(usual));
     let theta = |i: &usize| c.theta(round.draws[*i].as_slice());
     Ok(PosteriorSample {
         thetas: taken.iter().map(theta).collect(),

@@ -82,19 +82,15 @@ fn join(level: &mut f64, added: f64) {
 impl FittedLevels {
     /// Puts fitted levels in the place of declared ones, which are those of the study's step: variances add up over time.
     pub fn set(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        // Each row of each pass comes here: no root is drawn that is 1 or is not used.
-        let per_step = match now.dt == self.step {
-            true => 1.0,
-            false => (now.dt / self.step).sqrt(),
-        };
+        let (per_step, per_second) = ((now.dt / self.step).sqrt(), now.dt.sqrt());
         for (level, source) in process.iter_mut().zip(&self.process) {
             *level = match *source {
                 LevelSource::Declared => *level * per_step,
                 LevelSource::Fitted { entry, declared } if declared > 0.0 => {
                     *level * per_step * (now.theta[entry] / declared)
                 }
-                LevelSource::Fitted { entry, .. } => now.theta[entry] * now.dt.sqrt(),
-                LevelSource::Follows { entry, share } => now.theta[entry] * share * now.dt.sqrt(),
+                LevelSource::Fitted { entry, .. } => now.theta[entry] * per_second,
+                LevelSource::Follows { entry, share } => now.theta[entry] * share * per_second,
             };
         }
         for (level, source) in measurement.iter_mut().zip(&self.measurement) {
