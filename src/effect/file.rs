@@ -123,9 +123,9 @@ mod tests {
         let first = "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n";
         for (second, line, problem) in [
             ("error = 'x'", 7, "unknown key `error`"),
-            ("magnitudes = { time = -1.0 }", 7, "time = -1 is outside"),
-            ("magnitudes = { tme = 1.0 }", 7, "did you mean \"time\""),
-            ("magnitudes.time = 'x'", 7, "invalid type"),
+            ("magnitudes = { tau = -1.0 }", 7, "tau = -1 is outside"),
+            ("magnitudes = { tao = 1.0 }", 7, "did you mean \"tau\""),
+            ("magnitudes.tau = 'x'", 7, "expected a number"),
         ] {
             let told = told(&format!("{first}{first}{second}\n"));
             let found = told.contains(&format!("line {line}: ")) && told.contains(problem);
@@ -133,7 +133,7 @@ mod tests {
         }
         let missing = told(&format!("{first}\n[[effect]]\nid = 'sensor-lag'\n"));
         assert!(
-            missing.contains("line 5: missing field `target`"),
+            missing.contains("line 5: missing key `target`"),
             "{missing}"
         );
         let unknown = told(&format!("{first}[[effect]]\nid = 'lag'\ntarget = 'y'"));
