@@ -9,7 +9,7 @@ use serde::Deserialize;
 use std::path::Path;
 use toml::de::DeTable;
 
-/// Longest file of effects, in bytes: a hundred times one that names every effect.
+/// Longest effect file, in bytes: thousands of effects.
 const LARGEST_FILE: u64 = 1 << 20;
 
 #[derive(Deserialize)]
