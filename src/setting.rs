@@ -15,10 +15,10 @@ use std::fmt::Display;
 /// Writes a number for a message: whole, or to eight digits; with an exponent where it is very large or small.
 pub(crate) fn number(value: f64) -> String {
     let rounded = format!("{value:.7e}").parse().unwrap_or(value);
-    let is_whole = value.fract() == 0.0 && value.abs() < 1e15;
+    let is_whole = value.fract() == 0.0 && value.abs() < 1e12;
     let value = if is_whole { value } else { rounded };
     let size = value.abs();
-    match size == 0.0 || !size.is_finite() || (1e-5..1e9).contains(&size) {
+    match is_whole || !size.is_finite() || (1e-5..1e9).contains(&size) {
         true => value.to_string(),
         false => format!("{value:e}"),
     }

@@ -4,6 +4,7 @@ use super::entries::TableEntry;
 use super::error::EquationsError;
 use super::graph::{Id, Varies};
 use super::names::Scope;
+use crate::setting::number;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::de::{DeTable, DeValue};
 
@@ -107,7 +108,8 @@ impl Declared {
     ) -> Result<(), EquationsError> {
         match names.graph.constant(level) {
             Some(level) if level < 0.0 => entry.error(format!(
-                "noise = {level}; a standard deviation is 0 or more"
+                "noise = {}; a standard deviation is 0 or more",
+                number(level)
             )),
             _ => Ok(()),
         }
@@ -180,6 +182,7 @@ impl Declared {
         }
         match names.graph.constant(start.deviation) {
             Some(std) if !(std >= 0.0 && std.is_finite()) => {
+                let std = number(std);
                 table.error(format!("std = {std}; a standard deviation is 0 or more"))
             }
             _ => Ok(start),

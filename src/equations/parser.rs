@@ -2,7 +2,7 @@
 
 use super::lexer::{Problem, Token, tokens};
 use super::operation::{Binary, Callable, FUNCTIONS, Unary};
-use crate::setting::did_you_mean;
+use crate::setting::{did_you_mean, number};
 
 /// Longest expression, in bytes: some thousand operations.
 const LONGEST: usize = 20_000;
@@ -263,7 +263,7 @@ fn unexpected(token: Token<'_>, expected: &str) -> String {
                 "the expression ends where {expected} is expected; write one behind it"
             );
         }
-        Token::Number(number) => format!("unexpected {number}"),
+        Token::Number(given) => format!("unexpected {}", number(given)),
         Token::Name(word) => format!("unexpected \"{word}\""),
         Token::Sign(sign) => format!("unexpected \"{sign}\""),
     };

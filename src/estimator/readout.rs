@@ -1,7 +1,9 @@
 //! From features to parameters: the network, and what stands around it.
 
 use crate::estimator::budget::BUDGET;
-use crate::math::{MathError, Whitening, nearest, norm, quantile, to_array, to_matrix, unit};
+use crate::math::{
+    MathError, Whitening, ascending, nearest, norm, quantile, to_array, to_matrix, unit,
+};
 use crate::network::{Network, NetworkError};
 use crate::twin::ParameterSpace;
 use ndarray::{Array1, Array2, Axis, aview1, concatenate};
@@ -307,7 +309,7 @@ impl Calibration {
         let mut nearest: Vec<(f64, usize)> = (0..self.predicted.nrows())
             .map(|i| (distance(i), i))
             .collect();
-        nearest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ascending(&mut nearest, |a| a.0);
         nearest.truncate(BUDGET.neighbours);
         nearest.into_iter().map(|(_, i)| i).collect()
     }

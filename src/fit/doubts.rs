@@ -236,7 +236,10 @@ impl<'a> Doubts<'a> {
             return;
         }
         let distance = match convergence.distance {
-            far if far.is_finite() => format!("{far:.2} standard deviations from the top, "),
+            far if far.is_finite() => {
+                let far = number(three_digits(far));
+                format!("{far} standard deviations from the top, ")
+            }
             _ => String::new(),
         };
         let what = format!(

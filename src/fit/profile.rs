@@ -16,6 +16,7 @@ use super::problem::Problem;
 use crate::fit::budget::BUDGET;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::kalman::FilterError;
+use crate::math::ascending;
 use crate::twin::Role;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -307,7 +308,7 @@ impl Profiled {
         };
         let mut all: Vec<ProfilePoint> =
             (both.iter().flatten().chain([&middle])).cloned().collect();
-        all.sort_by(|a, b| a.phi[j].total_cmp(&b.phi[j]));
+        ascending(&mut all, |a| a.phi[j]);
         let highest = all.iter().map(|p| p.drop).fold(0.0, f64::min);
         all.iter_mut().for_each(|point| point.drop -= highest);
         let value = |phi: f64| {

@@ -168,7 +168,7 @@ impl Library<'_> {
         let cycle = TERM.frequencies_per_cycle * self.scales.duration();
         let slow = (2..=TERM.slow).map(|i| i as f64 / cycle);
         let mut all: Vec<f64> = slow.chain(self.frequencies.iter().copied()).collect();
-        all.sort_by(f64::total_cmp);
+        all.sort_unstable_by(f64::total_cmp);
         all.dedup();
         all
     }

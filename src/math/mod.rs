@@ -13,6 +13,7 @@ mod error;
 mod lagged;
 mod least_squares;
 mod number;
+mod order;
 mod statistics;
 mod svd;
 mod whitening;
@@ -24,6 +25,7 @@ pub use error::MathError;
 pub(crate) use lagged::{Lagged, LaggedSignals};
 pub(crate) use least_squares::{LeastSquares, Regression, Regressors};
 pub(crate) use number::{Condition, LANES, Lanes, Mask, Number, nearest};
+pub(crate) use order::{ascending, descending};
 pub(crate) use statistics::{
     CONSTANT, clopper_pearson, correlation, deviation, ends, is_constant, largest, log_mean,
     median, norm, quantile, rank_p_value, six_digits, three_digits, unit,

@@ -3,6 +3,7 @@
 use super::MathError;
 use super::cholesky::dot;
 use super::widest::widest;
+use crate::math::descending;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Sweeps over all pairs of columns; six to ten are usual.
@@ -58,7 +59,7 @@ pub(crate) fn thin_svd(matrix: &DMatrix<f64>) -> Option<Svd> {
     }
     let norms: Vec<f64> = rotated.column_iter().map(|c| c.norm()).collect();
     let mut order: Vec<usize> = (0..columns).collect();
-    order.sort_by(|&a, &b| norms[b].total_cmp(&norms[a]));
+    descending(&mut order, |&i| norms[i]);
     let mut left = rotated.select_columns(&order);
     let values = DVector::from_iterator(columns, order.iter().map(|&j| norms[j]));
     for (mut column, &value) in left.column_iter_mut().zip(values.iter()) {

@@ -12,7 +12,7 @@ pub(crate) fn distinct(outputs: &[f64]) -> Vec<(f64, usize)> {
     let mut sorted: Vec<f64> = (outputs.iter().copied())
         .filter(|v| v.is_finite())
         .collect();
-    sorted.sort_by(f64::total_cmp);
+    sorted.sort_unstable_by(f64::total_cmp);
     let span = match (sorted.first(), sorted.last()) {
         (Some(low), Some(high)) => high - low,
         _ => 0.0,

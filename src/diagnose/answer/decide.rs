@@ -10,6 +10,7 @@ use super::posterior::{Mass, Posterior};
 use crate::diagnose::outcome::{Decision, TargetShare, Verdict};
 use crate::diagnose::thresholds::THRESHOLDS;
 use crate::effect::EffectKey;
+use crate::math::descending;
 
 /// Verdict, decision, the effects that the twin is given, their rivals, and the probabilities behind them.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,7 +140,7 @@ impl Posterior {
                 probability: *probability,
             })
             .collect();
-        targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        descending(&mut targets, |a| a.probability);
         targets
     }
 }

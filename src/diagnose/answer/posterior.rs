@@ -13,7 +13,7 @@
 
 use crate::diagnose::outcome::{Probabilities, TargetShare};
 use crate::diagnose::thresholds::{Price, THRESHOLDS};
-use crate::math::log_mean;
+use crate::math::{descending, log_mean};
 use std::collections::BTreeMap;
 
 /// Places and the share of each.
@@ -374,7 +374,7 @@ impl Sums {
                 beside: beside[0] * share,
             });
         }
-        masses.sort_by(|a, b| b.all().total_cmp(&a.all()));
+        descending(&mut masses, |a| a.all());
         masses
     }
 

@@ -14,6 +14,7 @@ use crate::hypothesis::search::model::Model;
 use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::kalman::recoverable;
+use crate::math::descending;
 use crate::study::StudyError;
 use crate::twin::{PRIOR_DEVIATION, Role};
 use std::sync::Arc;
@@ -35,9 +36,9 @@ pub(in crate::diagnose) fn effects(
             ))
         })
         .collect();
-    all.sort_by(|a, b| {
-        (b.probability.total_cmp(&a.probability)).then(b.log_evidence.total_cmp(&a.log_evidence))
-    });
+    // Of equal probabilities the larger evidence first.
+    descending(&mut all, |fit| fit.log_evidence);
+    descending(&mut all, |fit| fit.probability);
     if let Some(model) = accepted {
         let set = known.get(&answer.accepted.iter().cloned().collect());
         let gain = set.map_or(0.0, |e| known.gain(e));

@@ -7,7 +7,7 @@
 use super::functions::Curve;
 use crate::diagnose::outcome::{Discovery, Term};
 use crate::diagnose::thresholds::THRESHOLDS;
-use crate::math::{quantile, solve_truncated};
+use crate::math::{descending, quantile, solve_truncated};
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 
@@ -85,7 +85,7 @@ pub(in crate::diagnose) fn discover(
         })
         .filter(|(_, term)| term.inclusion >= THRESHOLDS.rare_term)
         .collect();
-    found.sort_by(|a, b| b.1.inclusion.total_cmp(&a.1.inclusion));
+    descending(&mut found, |a| a.1.inclusion);
     // What the two most frequent ones explain of the function itself.
     let subset: Vec<usize> = found.iter().take(2).map(|(k, _)| *k).collect();
     let chosen = columns.select_columns(&subset);

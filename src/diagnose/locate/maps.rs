@@ -5,6 +5,7 @@ use crate::diagnose::residuals::cut::{Bins, Cut, Past};
 use crate::diagnose::residuals::excess::excess;
 use crate::diagnose::residuals::shares::shares;
 use crate::hypothesis::search::model::Model;
+use crate::math::descending;
 use crate::study::StudyError;
 
 /// Describes the innovations of a model. `best` divides the shares by where it helps.
@@ -88,5 +89,7 @@ pub(in crate::diagnose) fn maps(model: &Model, best: Option<&Model>) -> Result<M
 }
 
 fn clearest_first<C: Cell>(cells: &mut [C]) {
-    cells.sort_by(|a, b| (b.share().total_cmp(&a.share())).then(b.score().total_cmp(&a.score())));
+    // Of equal shares the larger score first.
+    descending(cells, C::score);
+    descending(cells, C::share);
 }

@@ -19,7 +19,7 @@ use crate::diagnose::thresholds::THRESHOLDS;
 use crate::effect::{TargetKind, targets};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
-use crate::math::{deviation, quantile};
+use crate::math::{descending, deviation, quantile};
 use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::{Entry, Parameter, Role};
@@ -210,7 +210,7 @@ fn clearest(measured: &Course, simulated: &[&Course]) -> Clearest {
             }
         }
     }
-    clear.sort_by(|a, b| b.0.total_cmp(&a.0));
+    descending(&mut clear, |a| a.0);
     best.score = clear.first().map_or(0.0, |(z, _)| z.max(0.0));
     best.scans = clear.into_iter().map(|(_, scan)| scan).collect();
     best

@@ -10,6 +10,7 @@ use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::{Nature, Part, Term};
+use crate::math::descending;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -309,6 +310,6 @@ pub(super) fn is_noise_apart(noise: &Explanation, effect: &Explanation) -> bool 
 /// Best first.
 fn sorted<'e>(all: impl Iterator<Item = &'e Explanation>) -> Vec<&'e Explanation> {
     let mut all: Vec<&Explanation> = all.collect();
-    all.sort_by(|a, b| b.log_z.total_cmp(&a.log_z));
+    descending(&mut all, |a| a.log_z);
     all
 }

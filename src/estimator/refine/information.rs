@@ -1,6 +1,7 @@
 //! Information of a record on θ: standard errors, and directions in words.
 
 use crate::estimator::error::EstimatorError;
+use crate::math::descending;
 use crate::twin::{PRIOR_DEVIATION, ParameterSpace, Role, combination, oriented};
 use nalgebra::{DMatrix, SymmetricEigen};
 use serde::Serialize;
@@ -106,7 +107,7 @@ fn directions(covariance: &DMatrix<f64>, space: &ParameterSpace) -> Vec<Directio
             }
         })
         .collect();
-    directions.sort_by(|a, b| b.std_error.total_cmp(&a.std_error));
+    descending(&mut directions, |a| a.std_error);
     directions
 }
 

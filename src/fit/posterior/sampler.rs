@@ -39,20 +39,21 @@ pub(in crate::fit) struct Proposal {
 }
 
 impl Proposal {
-    /// The proposal about the end of a search, from its information; none where nothing may move.
+    /// The proposal about the end of a search, from its information.
     pub fn around(problem: &Problem, fit: &Fitted) -> Option<Self> {
         let free: Vec<usize> = (0..fit.theta.len())
             .filter(|&j| !problem.axes[j].held)
             .collect();
-        if free.is_empty() {
-            return None;
-        }
         let information = fit.information.select_rows(&free).select_columns(&free);
         let centre = DVector::from_vec(problem.coordinates.of(&fit.theta));
         Self::new(free, centre, information.try_inverse()?)
     }
 
+    /// None where nothing may move, or where the covariance has no root.
     pub fn new(free: Vec<usize>, centre: DVector<f64>, covariance: DMatrix<f64>) -> Option<Self> {
+        if free.is_empty() {
+            return None;
+        }
         let root = covariance.clone().cholesky()?.l();
         let (nu, d) = (FREEDOM as f64, free.len() as f64);
         let gamma = statrs::function::gamma::ln_gamma;

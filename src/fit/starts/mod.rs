@@ -5,6 +5,7 @@ pub(crate) mod growing;
 mod scan;
 mod spectral;
 
+use crate::math::descending;
 use growing::{grown, sketch};
 use scan::scanned;
 pub(crate) use spectral::spectral_starts;
@@ -115,7 +116,7 @@ fn ranked(problem: &Problem, points: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Fil
     let mut all: Vec<(f64, Vec<f64>)> = (values.into_iter().zip(points))
         .filter_map(|(value, theta)| Some((value?, theta)))
         .collect();
-    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    descending(&mut all, |a| a.0);
     Ok(all.into_iter().map(|(_, theta)| theta).collect())
 }
 
@@ -281,7 +282,7 @@ pub(crate) fn polish(
 
 /// Best first; of equal ones the first start's stays first.
 pub(super) fn sort(fits: &mut [Fitted]) {
-    fits.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    descending(fits, |a| a.objective);
 }
 
 #[cfg(test)]

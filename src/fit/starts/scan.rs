@@ -8,6 +8,7 @@ use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
+use crate::math::descending;
 
 /// Searches from the highest tops along the axes through the best fit, and again from a better one that these find.
 pub(super) fn scanned(
@@ -73,7 +74,7 @@ fn tops(problem: &Problem, best: &Fitted) -> Result<Vec<Vec<f64>>, FilterError> 
             }
         }
     }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    descending(&mut found, |a| a.0);
     found.truncate(BUDGET.screened_starts);
     Ok(found.into_iter().map(|(_, theta)| theta).collect())
 }

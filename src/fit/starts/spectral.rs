@@ -10,6 +10,7 @@
 
 use crate::fit::budget::BUDGET;
 use crate::fit::problem::Problem;
+use crate::math::ascending;
 use crate::record::Record;
 use crate::twin::{Acting, Noise, Twin};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -45,7 +46,7 @@ pub(crate) fn spectral_starts(problem: &Problem) -> Vec<Vec<f64>> {
             sum.is_finite().then_some((sum, theta))
         })
         .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ascending(&mut found, |a| a.0);
     found.truncate(BUDGET.spectral_starts);
     found.into_iter().map(|(_, theta)| theta).collect()
 }

@@ -84,7 +84,7 @@ fn own_terms(model: &Model, effects: &[Effect]) -> Result<Vec<Term>, FilterError
     let dense = (2..=dense.clamp(2, SEARCH.most_frequencies))
         .map(|i| i as f64 / (TERM.frequencies_per_cycle * duration));
     let mut all: Vec<f64> = frequencies(model)?.into_iter().chain(dense).collect();
-    all.sort_by(f64::total_cmp);
+    all.sort_unstable_by(f64::total_cmp);
     let library = Library {
         twin: &model.base,
         theta: &theta,

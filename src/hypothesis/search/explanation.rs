@@ -3,6 +3,7 @@
 use super::model::Model;
 use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::Term;
+use crate::math::descending;
 use std::sync::Arc;
 
 /// A set of terms beside a twin, and how well it explains the records.
@@ -54,5 +55,5 @@ impl Explanation {
 
 /// Best first.
 pub(super) fn sort(all: &mut [Explanation]) {
-    all.sort_by(|a, b| b.log_z.total_cmp(&a.log_z));
+    descending(all, |a| a.log_z);
 }

@@ -3,6 +3,7 @@
 use super::model::Model;
 use crate::hypothesis::limits::SEARCH;
 use crate::likelihood::kalman::FilterError;
+use crate::math::descending;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
@@ -44,7 +45,7 @@ pub(crate) fn frequencies(model: &Model) -> Result<Vec<f64>, FilterError> {
             }
         }
     }
-    found.sort_by(f64::total_cmp);
+    found.sort_unstable_by(f64::total_cmp);
     Ok(found)
 }
 
@@ -64,7 +65,7 @@ fn peaks(series: &[f64]) -> Vec<usize> {
     let mut tops: Vec<usize> = (3..n.saturating_sub(1))
         .filter(|&i| power[i] >= power[i - 1] && power[i] >= power[i + 1])
         .collect();
-    tops.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+    descending(&mut tops, |&i| power[i]);
     tops.truncate(SEARCH.peaks);
     tops
 }

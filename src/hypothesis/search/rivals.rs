@@ -11,7 +11,7 @@ use crate::fit::reference::Reference;
 use crate::hypothesis::limits::SEARCH;
 use crate::hypothesis::term::{Nature, Term};
 use crate::likelihood::kalman::FilterError;
-use crate::math::{log_mean, median};
+use crate::math::{descending, log_mean, median};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -99,7 +99,7 @@ fn disturbances(
         .map(|p| log_mean(&p.starts.iter().map(|start| start.nats).collect::<Vec<_>>()))
         .collect();
     let mut order: Vec<usize> = (0..rough.len()).collect();
-    order.sort_by(|a, b| rough[*b].total_cmp(&rough[*a]));
+    descending(&mut order, |&i| rough[i]);
     (order.into_par_iter().enumerate())
         .map(|(n, i)| {
             let is_worth = rough[i] > 0.0 || promises[i].nats() > breadth.least;

@@ -8,6 +8,7 @@ use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::reference::Reference;
 use crate::hypothesis::term::{Start, Term, marks};
 use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::math::descending;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -63,7 +64,7 @@ pub(crate) fn scan_from(
                 .map(|start| promise(model, reference, &extended, start))
                 .filter_map(Result::transpose)
                 .collect::<Result<_, FilterError>>()?;
-            starts.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+            descending(&mut starts, |a| a.nats);
             Ok(Promise {
                 term: term.clone(),
                 mark: marks(model.terms.iter().chain([term])) - marks(&model.terms),
@@ -72,7 +73,7 @@ pub(crate) fn scan_from(
         })
         .collect::<Result<_, FilterError>>()?;
     all.retain(|promise| !promise.starts.is_empty());
-    all.sort_by(|a, b| b.nats().total_cmp(&a.nats()));
+    descending(&mut all, |a| a.nats());
     Ok(all)
 }
 
@@ -164,6 +165,6 @@ pub(crate) fn functions(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Linear
         })
         .filter_map(Result::transpose)
         .collect::<Result<_, FilterError>>()?;
-    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    descending(&mut all, |a| a.gain);
     Ok(all)
 }

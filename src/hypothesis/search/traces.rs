@@ -15,7 +15,7 @@ use crate::hypothesis::entry::Entry;
 use crate::hypothesis::term::Term;
 use crate::hypothesis::trace::Trail;
 use crate::likelihood::kalman::{FilterError, Responses, recoverable};
-use crate::math::log_mean;
+use crate::math::{descending, log_mean};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -62,14 +62,14 @@ pub(super) fn screened(
     }
     let (mut best, mut ways) = (vec![], BTreeMap::new());
     for (key, mut grid) in grids {
-        grid.sort_by(|a, b| b.1.total_cmp(&a.1));
+        descending(&mut grid, |a| a.1);
         let all: Vec<f64> = grid.iter().map(|(_, gain)| *gain).collect();
         if all[0].is_finite() {
             ways.insert(key, all[0] - log_mean(&all));
             best.extend(grid.into_iter().next());
         }
     }
-    best.sort_by(|a, b| b.1.total_cmp(&a.1));
+    descending(&mut best, |a| a.1);
     let is_worth = |(_, gain): &&(Arc<Term>, f64)| *gain > breadth.least;
     let most = best.iter().take(breadth.functions).take_while(is_worth);
     let others = best.split_off(most.count());

@@ -38,7 +38,7 @@ pub(super) fn free_motion(
     }
     (distances.into_iter())
         .map(|mut d| {
-            d.sort_by(f64::total_cmp);
+            d.sort_unstable_by(f64::total_cmp);
             let median = d.get(d.len() / 2).copied().unwrap_or(0.0);
             if median > 0.0 { median } else { fallback }
         })

@@ -3,6 +3,7 @@
 use super::share::share_with_interval;
 use super::words::{effect, effects, few, joined};
 use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, Location, THRESHOLDS, Verdict};
+use crate::math::descending;
 use crate::report::NEXT_INPUT;
 use crate::report::digits::{SHOWN, chance, percent, short, with_unit};
 use crate::report::units::Units;
@@ -35,7 +36,7 @@ impl<'d> Names<'d> {
             .into_iter()
             .partition(|e| open.is_empty() || e.probability + most > 1.0);
         open.extend(rivals);
-        open.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        descending(&mut open, |a| a.probability);
         Self {
             together: open.iter().map(|e| e.probability).sum::<f64>().min(1.0),
             is_one_there: open.iter().any(|e| is_in(&cause.accepted, e)),

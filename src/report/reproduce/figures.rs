@@ -3,6 +3,7 @@
 use crate::estimator::INTERVAL_LEVEL;
 use crate::evaluate::baseline::Initialisation::Bad;
 use crate::evaluate::paper::{AnswerRuns, MeanRuns, PointScore, ScoredMethod};
+use crate::math::ascending;
 use crate::record::Signal;
 use crate::report::chart::{Dot, Dots, Line, Panel, Span, Style, chart, roomy};
 use crate::report::digits::{SHOWN, in_unit, named};
@@ -134,7 +135,7 @@ pub fn coverage_svg(study: &Study, points: &[PointScore]) -> Option<String> {
         .flat_map(|(j, parameter)| {
             let dots = |dot: &dyn Fn(&PointScore) -> Dot| -> Vec<Dot> {
                 let mut dots: Vec<Dot> = points.iter().map(dot).collect();
-                dots.sort_by(|a, b| a.x.total_cmp(&b.x));
+                ascending(&mut dots, |a| a.x);
                 dots
             };
             let shares = dots(&|point| {

@@ -64,7 +64,7 @@ impl Workspace {
             .chain(jumps(&way).iter().copied())
             .filter(|share| *share > 0.0 && *share < 1.0)
             .collect();
-        breaks.sort_by(f64::total_cmp);
+        breaks.sort_unstable_by(f64::total_cmp);
         breaks.dedup();
         let mut path = Path {
             now: &way,

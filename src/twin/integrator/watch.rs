@@ -6,6 +6,7 @@
 use super::event::Event;
 use super::path::{Path, Stretch};
 use super::{Integrator, Now};
+use crate::math::ascending;
 
 /// Events of a point between two samples, at most. A ball that comes to rest has infinitely many; twice as many find no more of anything
 /// that is measured, half cuts off what rattles.
@@ -73,7 +74,7 @@ impl EventCalls<'_> {
                 }
             }
         });
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ascending(&mut all, |a| a.0);
         all
     }
 }

@@ -2,7 +2,7 @@
 
 use super::functions::{Tree, Waves};
 use super::{DeparturePlace, Moment};
-use crate::math::nearest;
+use crate::math::{ascending, nearest};
 use crate::twin::{Noise, Source};
 use serde::de::IntoDeserializer;
 use serde::de::value::Error as ValueError;
@@ -254,7 +254,7 @@ impl Families {
                 (lot, family)
             })
             .collect();
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ascending(&mut all, |a| a.0);
         let half = all.len() / 2;
         let all = all.into_iter().map(|(_, family)| family);
         match self {

@@ -1,6 +1,7 @@
 //! Pictures along time or a variable: records, windows, the next input, missing functions.
 
 use crate::diagnose::{Cell, Diagnosis, Maps, MissingFunction, Onset};
+use crate::math::ascending;
 use crate::report::chart::{
     Area, HeatGroup, HeatRow, Line, Panel, Span, Style, TimeMark, chart, heat_map,
 };
@@ -101,7 +102,7 @@ pub(super) fn spans(maps: &Maps, full: f64, (record, channel): (usize, &str)) ->
             clear: w.is_notable(),
         })
         .collect();
-    spans.sort_by(|a, b| a.from.total_cmp(&b.from));
+    ascending(&mut spans, |a| a.from);
     spans
 }
 

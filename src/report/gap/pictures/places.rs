@@ -1,6 +1,7 @@
 //! Places: in the twin, at values of its variables, by output, lag and frequency.
 
 use crate::diagnose::{Cell, Diagnosis};
+use crate::math::ascending;
 use crate::report::chart::{Bar, BarGroup, bar_chart};
 use crate::report::digits::{SHOWN, chance, percent, short, with_unit};
 use crate::report::gap::statement::places;
@@ -43,7 +44,7 @@ fn shares<C: Cell>(
         groups.entry(group).or_default().push((place, bar));
     }
     let groups = groups.into_iter().map(|(group, mut bars)| {
-        bars.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ascending(&mut bars, |a| a.0);
         let bars = bars.into_iter().map(|(_, bar)| bar).collect();
         BarGroup::new(&group, None, bars).per_cent()
     });

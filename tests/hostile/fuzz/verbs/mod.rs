@@ -39,7 +39,11 @@ fn run(place: &Path, case: &Case, projects: &[Project]) -> Ended {
         let _ = fs::remove_dir_all(at(name));
     }
     let [first, second] = &case.records;
-    // The same line for each request.
+    // The same line for each request; a program that says nothing is waited for, which a signal alone ends.
+    let line = match case.description.trim_ascii() {
+        b"" => b"-",
+        line => line,
+    };
     let script = format!(
         "#!/bin/sh\nwhile read line; do cat {0}; echo; done\n",
         at("p.line").display()
@@ -49,7 +53,7 @@ fn run(place: &Path, case: &Case, projects: &[Project]) -> Ended {
         ("s2.toml", &case.study[..]),
         ("r.csv", first),
         ("r2.csv", second),
-        ("p.line", &case.description),
+        ("p.line", line),
         ("p.sh", script.as_bytes()),
     ] {
         fs::write(at(name), bytes).unwrap();
@@ -79,7 +83,7 @@ fn fault(place: &Path, case: &Case, ended: &Ended, took: Duration) -> Option<Str
         0 if errors.is_empty() => {}
         1 if is_of_check => {}
         // The command line says more of a call that is stopped.
-        1 if said == "error: cancelled" && took > PATIENCE => {}
+        1 if errors == ["error: cancelled"] && took > PATIENCE => {}
         130 if took > PATIENCE => {}
         2 if errors.len() == 1 && said.ends_with(errors[0]) => {}
         code => return Some(format!("code {code}: {said}")),
