@@ -124,6 +124,7 @@ extern crate self as truetwin;
 pub mod setting;
 
 mod math;
+mod parallel;
 pub mod progress;
 pub mod storage;
 

@@ -3,7 +3,7 @@
 use super::error::EquationsError;
 use super::lexer::is_name;
 use super::operation::Callable;
-use super::place::{PlacedExpression, SourceText, number};
+use super::place::{PlacedExpression, SourceText, in_order, number};
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, hidden};
 use crate::twin::Interval;
@@ -42,17 +42,14 @@ pub(super) fn entries<'a, 't>(
         );
     };
     check_number(source, value.span().start, (table, keys.len()))?;
-    let mut entries: Vec<TableEntry<'_, '_>> = (keys.iter())
-        .map(|(key, value)| TableEntry {
-            source,
-            table,
-            name: key.get_ref(),
-            byte: key.span().start,
-            value,
-        })
-        .collect();
-    entries.sort_by_key(|entry| entry.byte);
-    Ok(entries)
+    let entries = in_order(keys).into_iter().map(|(key, value)| TableEntry {
+        source,
+        table,
+        name: key.get_ref(),
+        byte: key.span().start,
+        value,
+    });
+    Ok(entries.collect())
 }
 
 /// Checks that a table has no more entries than a file may have.

@@ -10,6 +10,7 @@ use super::place::{SourceText, number};
 use super::program::{Program, Tapes};
 use super::tape::OperationTape;
 use super::twin::Equations;
+use super::written::written;
 use crate::record::Quantity;
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, message};
@@ -487,64 +488,4 @@ fn integrator(
         stepping.tolerance = tolerance;
     }
     Ok((integrator, stepping))
-}
-
-/// Returns the tables of a twin as a file has them, without comments.
-fn written(file: &DeTable<'_>) -> String {
-    let mut text = String::new();
-    for table in TABLES {
-        let Some(value) = file.get(table) else {
-            continue;
-        };
-        match value.get_ref() {
-            DeValue::Table(entries) => text += &written_table(&format!("[{table}]"), entries),
-            DeValue::Array(all) => {
-                let tables = all.iter().filter_map(|value| value.get_ref().as_table());
-                tables.for_each(|keys| text += &written_table(&format!("[[{table}]]"), keys));
-            }
-            value => text += &format!("[{table}]\nname = {}\n\n", inline(value)),
-        }
-    }
-    text
-}
-
-/// Returns a table with its keys, in the order of the file.
-fn written_table(head: &str, entries: &DeTable<'_>) -> String {
-    let mut text = format!("{head}\n");
-    let mut entries: Vec<_> = entries.iter().collect();
-    entries.sort_by_key(|(key, _)| key.span().start);
-    for (key, value) in entries {
-        let (key, value) = (toml_key(key.get_ref()), inline(value.get_ref()));
-        text += &format!("{key} = {value}\n");
-    }
-    text + "\n"
-}
-
-fn toml_key(key: &str) -> String {
-    match !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-        true => key.to_owned(),
-        false => toml::Value::String(key.into()).to_string(),
-    }
-}
-
-/// Returns a value in one line.
-fn inline(value: &DeValue<'_>) -> String {
-    match value {
-        DeValue::String(text) => toml::Value::String(text.to_string()).to_string(),
-        DeValue::Boolean(is_true) => is_true.to_string(),
-        DeValue::Float(number) => number.as_str().to_owned(),
-        DeValue::Array(all) => {
-            let all: Vec<String> = all.iter().map(|value| inline(value.get_ref())).collect();
-            format!("[{}]", all.join(", "))
-        }
-        DeValue::Table(entries) => {
-            let mut entries: Vec<_> = entries.iter().collect();
-            entries.sort_by_key(|(key, _)| key.span().start);
-            let all = entries.into_iter().map(|(key, value)| {
-                format!("{} = {}", toml_key(key.get_ref()), inline(value.get_ref()))
-            });
-            format!("{{ {} }}", all.collect::<Vec<_>>().join(", "))
-        }
-        other => number(other).unwrap_or(f64::NAN).to_string(),
-    }
 }

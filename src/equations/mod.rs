@@ -19,7 +19,7 @@
 //!
 //! | step | file |
 //! |---|---|
-//! | tables of the file, their keys and places | `file.rs`, `place.rs`, `entries.rs` |
+//! | tables of the file, their keys and places | `file.rs`, `place.rs`, `entries.rs`; written again: `written.rs` |
 //! | words and signs of an expression; its operations in order | `lexer.rs`, `parser.rs`, `operation.rs` |
 //! | names, definitions, common parts, constants | `names.rs`, `graph.rs` |
 //! | operations over blocks | `tape.rs`, `groups.rs`, `scratch.rs`, `feed.rs` |
@@ -46,6 +46,7 @@ mod tape;
 #[cfg(test)]
 mod tests;
 mod twin;
+mod written;
 
 pub(crate) use declared::Declared;
 pub use error::EquationsError;

@@ -4,7 +4,7 @@ use super::error::EquationsError;
 use super::lexer::Problem;
 use super::parser::Expression;
 use toml::Spanned;
-use toml::de::DeValue;
+use toml::de::{DeString, DeTable, DeValue};
 
 /// The text of a file.
 #[derive(Debug, Clone, Copy)]
@@ -88,4 +88,14 @@ pub(super) fn number(value: &DeValue<'_>) -> Option<f64> {
         }
         _ => None,
     }
+}
+
+/// A key of a table, and its value.
+pub(super) type Keyed<'a, 't> = (&'a Spanned<DeString<'t>>, &'a Spanned<DeValue<'t>>);
+
+/// Returns the entries of a table in the order of the file.
+pub(super) fn in_order<'a, 't>(table: &'a DeTable<'t>) -> Vec<Keyed<'a, 't>> {
+    let mut all: Vec<Keyed<'a, 't>> = table.iter().collect();
+    all.sort_by_key(|(key, _)| key.span().start);
+    all
 }

@@ -8,8 +8,8 @@ use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::fit::solver::{LocalModel, Objective, Solver};
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
+use crate::parallel::try_each;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 /// Result of a fit.
 #[derive(Debug, Clone)]
@@ -168,16 +168,14 @@ fn add_differences(
     model: &mut LocalModel,
 ) -> Result<(), FilterError> {
     let here = Reference::bare(innovations);
-    let directions: Vec<Option<DVector<f64>>> = (problem.neighbours(theta).into_par_iter())
-        .enumerate()
-        .map(|(j, (moved, distance))| {
-            if problem.axes[j].held {
-                return Ok(None);
-            }
-            let there: Vec<Filtered> = problem.filtered(&moved)?;
-            Ok(Some(here.direction(&there) / distance))
-        })
-        .collect::<Result<_, FilterError>>()?;
+    let neighbours = problem.neighbours(theta).into_iter().enumerate();
+    let directions = try_each(neighbours, |(j, (moved, distance))| {
+        if problem.axes[j].held {
+            return Ok(None);
+        }
+        let there: Vec<Filtered> = problem.filtered(&moved)?;
+        Ok::<_, FilterError>(Some(here.direction(&there) / distance))
+    })?;
     model.cost -= here.filtered.iter().map(|f| f.log_likelihood).sum::<f64>();
     for (i, a) in directions.iter().enumerate() {
         let Some(a) = a else { continue };

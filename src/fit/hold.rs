@@ -5,6 +5,7 @@
 use super::climb::{Fitted, climb};
 use super::problem::Problem;
 use super::reference::Reference;
+use super::starts::growing::sketch;
 use crate::fit::budget::BUDGET;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
@@ -35,18 +36,22 @@ pub(crate) fn other_hold(
         return Ok(None);
     }
     let theta = &fitted.theta;
-    let Some(reference) = Reference::new(problem, theta)? else {
+    // Gains grow with the rows: those over the beginning of a long record tell which rules are worth a search over all of it.
+    let sketched = sketch(problem);
+    let short = sketched.as_ref().unwrap_or(problem);
+    let share = short.samples() as f64 / problem.samples() as f64;
+    let Some(reference) = Reference::new(short, theta)? else {
         return Ok(None);
     };
     let mut shown = vec![];
     for hold in [Hold::Zero, Hold::Linear, Hold::Spline, Hold::Nearest] {
-        let other = problem.stepped(Stepping { hold, ..own });
+        let other = short.stepped(Stepping { hold, ..own });
         let Some(other) = other.filter(|_| hold != own.hold) else {
             continue;
         };
         let filtered = recoverable(other.filtered(theta))?;
-        let shows =
-            |f: &Vec<Filtered>| 0.5 * reference.own(&reference.direction(f)) > BUDGET.hold_shows;
+        let gain = |f: &Vec<Filtered>| 0.5 * reference.own(&reference.direction(f)) / share;
+        let shows = |f: &Vec<Filtered>| gain(f) > BUDGET.hold_shows;
         if filtered.as_ref().is_some_and(shows) {
             shown.push(hold);
         }

@@ -17,9 +17,9 @@ use crate::fit::budget::BUDGET;
 use crate::fit::budget::ITERATIONS;
 use crate::likelihood::kalman::FilterError;
 use crate::math::ascending;
+use crate::parallel::try_each;
 use crate::twin::Role;
 use nalgebra::DVector;
-use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeSet;
@@ -169,9 +169,7 @@ impl Profiled {
     fn of(&self, entries: &[usize], level: f64) -> Result<Vec<Profile>, FilterError> {
         let depth = depth(level);
         let sides = entries.iter().flat_map(|&j| [(j, -1.0), (j, 1.0)]);
-        let sides: Vec<Vec<ProfilePoint>> = (sides.collect::<Vec<_>>().into_par_iter())
-            .map(|(j, sign)| self.side(j, sign, depth))
-            .collect::<Result<_, FilterError>>()?;
+        let sides = try_each(sides, |(j, sign)| self.side(j, sign, depth))?;
         let both = entries.iter().zip(sides.chunks_exact(2));
         Ok(both
             .map(|(&j, both)| self.profile(j, both, depth))

@@ -5,9 +5,9 @@ use super::kalman::{
     Coordinates, FilterError, FilterSettings, Filtered, Gaussian, Kalman, Responses, Score, States,
     recoverable,
 };
+use crate::parallel::try_each;
 use crate::record::{Record, Signal};
 use crate::twin::{Composed, ComposedBlackBox, DigitalTwin, Outline, Twin};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Likelihood of a record at θ.
@@ -187,7 +187,7 @@ impl Likelihood for EnsembleLikelihood {
             let found = recoverable(self.filtered(theta, record))?;
             Ok(found.map(|filtered| filtered.log_likelihood))
         };
-        thetas.par_iter().map(value).collect()
+        try_each(thetas, value)
     }
     fn score(&self, _: &[f64], _: &Record, _: &Coordinates) -> Result<Option<Score>, FilterError> {
         Ok(None)

@@ -12,6 +12,8 @@ mod fmu;
 mod mpi;
 #[cfg(feature = "parquet")]
 mod parquet;
+#[path = "../common/studies.rs"]
+mod studies;
 #[cfg(feature = "mpi")]
 #[path = "../common/timeless.rs"]
 mod timeless;

@@ -2,8 +2,8 @@
 //!
 //! Without `mpirun` these tests say that they skipped, unless `TRUETWIN_MPI=required`.
 
-use crate::cli::few_effects;
 use crate::files::files;
+use crate::studies::short;
 use crate::timeless::timeless;
 use serde_json::Value;
 use std::fs;
@@ -158,7 +158,7 @@ fn ranks_share_records_and_trials() {
         return;
     }
     let place = tempfile::tempdir().unwrap();
-    let few = few_effects(place.path());
+    let few = short(place.path());
     let calls: [(&str, &[&str]); 2] = [
         (
             "reproduce.json",

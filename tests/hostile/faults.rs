@@ -2,6 +2,7 @@
 //! goes on once there is room. On small file systems of our own, in a name space of our own.
 
 use crate::files::files;
+use crate::studies::short;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -60,7 +61,7 @@ const WRITERS: [&str; 8] = [
 
 /// A study, a record and an estimator.
 fn prepare(at: &Path) {
-    crate::stop::short(at);
+    short(at);
     for words in [
         "simulate --twin van-der-pol --theta nu=1 --out r.csv",
         "pretrain --twin van-der-pol --bank-size 300 --epochs 2 --out v.est",
@@ -175,7 +176,7 @@ fn outputs_that_take_nothing_are_no_panic() {
 fn two_processes_fill_one_folder() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
-    crate::stop::short(at);
+    short(at);
     for (words, part) in [
         ("bank --twin van-der-pol --size 3000", ""),
         (

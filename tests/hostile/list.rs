@@ -1,6 +1,7 @@
 //! Hostile calls that once failed: each ends in one line that names the problem, the place and the remedy.
 
 use crate::files::files;
+use crate::studies::short;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -250,7 +251,7 @@ fn leftovers_of_killed_runs_are_removed_by_the_next() {
 #[test]
 fn leftovers_in_a_folder_of_trials_are_removed_by_the_next_run() {
     let place = tempfile::tempdir().unwrap();
-    crate::stop::short(place.path());
+    short(place.path());
     let trials =
         "withheld --study short.toml --trials 1 --kinds none --detection-only --out trials";
     assert!(run(place.path(), trials).status.success());

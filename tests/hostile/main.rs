@@ -14,6 +14,8 @@ mod places;
 mod security;
 #[cfg(unix)]
 mod stop;
+#[path = "../common/studies.rs"]
+mod studies;
 #[path = "../common/timeless.rs"]
 mod timeless;
 mod versions;

@@ -1,6 +1,7 @@
 //! Names and places that a system allows: bytes that are no text, pipes, links to nothing, a user's own dotfiles, places that are taken
 //! while the work goes on. No answer is lost to them.
 
+use crate::studies::short;
 use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
@@ -23,7 +24,7 @@ fn run(folder: &Path, words: &str) -> Output {
 /// A folder with a short record of the oscillator and its study.
 fn with_record() -> tempfile::TempDir {
     let place = tempfile::tempdir().unwrap();
-    crate::stop::short(place.path());
+    short(place.path());
     let made = run(
         place.path(),
         "simulate --study short.toml --theta nu=1 --out r.csv",

@@ -2,6 +2,7 @@
 //! of an undisturbed run.
 
 use crate::files::files;
+use crate::studies::short;
 use crate::timeless::timeless;
 use std::fs;
 use std::path::Path;
@@ -16,13 +17,6 @@ fn start(folder: &Path, arguments: &str) -> std::process::Child {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap()
-}
-
-/// A study of short records and few effects.
-pub fn short(folder: &Path) {
-    let study = "twin = 'van-der-pol'\n[record]\nsamples = 100\n\
-                 [library]\nonly = ['sensor-bias', 'sensor-gain', 'linear-loss']\n";
-    fs::write(folder.join("short.toml"), study).unwrap();
 }
 
 fn entries(folder: &Path) -> usize {

@@ -4,9 +4,10 @@ use crate::source::Crate;
 use std::collections::BTreeMap;
 
 /// The rooms of docs/architecture.md, lowest first.
-const ROOMS: [&str; 22] = [
+const ROOMS: [&str; 23] = [
     "setting",
     "math",
+    "parallel",
     "progress",
     "storage",
     "record",

@@ -20,10 +20,10 @@ use crate::effect::{TargetKind, targets};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
 use crate::math::{descending, deviation, quantile};
+use crate::parallel::try_each;
 use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::{Entry, Parameter, Role};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// A place that may be disturbed.
@@ -63,9 +63,9 @@ impl Predictive<'_> {
         let measured = courses(problem, fitted, &problem.records, &places)?;
         let (reference, _) = self.reference();
         let replicates = self.replicates(0..THRESHOLDS.check_first, |_| &reference)?;
-        let simulated: Vec<Vec<Course>> = (replicates.par_iter())
-            .map(|Replicate { records, .. }| courses(problem, fitted, records, &places))
-            .collect::<Result<_, _>>()?;
+        let simulated = try_each(&replicates, |Replicate { records, .. }| {
+            courses(problem, fitted, records, &places)
+        })?;
         let clear: Vec<Clearest> = (0..places.len())
             .map(|i| {
                 let simulated: Vec<&Course> = simulated.iter().map(|all| &all[i]).collect();

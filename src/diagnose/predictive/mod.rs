@@ -29,10 +29,10 @@ use crate::fit::posterior::PosteriorSample;
 use crate::fit::problem::Problem;
 use crate::hypothesis::search::model::Model;
 use crate::math::{deviation, quantile};
+use crate::parallel::try_each;
 use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::Noise;
-use rayon::prelude::*;
 use statistics::{Discrepancy, Look};
 use std::ops::Range;
 
@@ -113,9 +113,8 @@ impl Predictive<'_> {
         numbers: Range<usize>,
         theta: impl Fn(usize) -> &'t Vec<f64> + Sync,
     ) -> Result<Vec<Replicate>, StudyError> {
-        (numbers.into_par_iter())
-            .filter_map(|i| self.replicate(i, theta(i).clone()).transpose())
-            .collect()
+        let all = try_each(numbers, |i| self.replicate(i, theta(i).clone()))?;
+        Ok(all.into_iter().flatten().collect())
     }
 
     fn replicate(&self, i: usize, theta: Vec<f64>) -> Result<Option<Replicate>, StudyError> {
@@ -191,9 +190,8 @@ fn looks(
     replicates: &[Replicate],
     statistics: &[Discrepancy],
 ) -> Result<Vec<Look>, StudyError> {
-    (replicates.par_iter())
-        .filter_map(|one| {
-            statistics::look(problem, &one.records, &one.theta, statistics).transpose()
-        })
-        .collect()
+    let looks = try_each(replicates, |one| {
+        statistics::look(problem, &one.records, &one.theta, statistics)
+    })?;
+    Ok(looks.into_iter().flatten().collect())
 }

@@ -2,11 +2,11 @@
 
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::hypothesis::search::model::Model;
+use crate::parallel::try_each;
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::Noise;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Returns the evidence for a gap in each simulated record, and whether the work was stopped before the last: those that were done are
@@ -21,46 +21,43 @@ pub(in crate::diagnose) fn calibrate(
     let is_cut = AtomicBool::new(false);
     let theta = &model.fitted.theta;
     let problem = &model.problem;
-    let values: Vec<Option<f64>> = (0..settings.calibrate as u64)
-        .into_par_iter()
-        .map(|i| {
-            if is_cut.load(Ordering::Relaxed) {
+    let values = try_each(0..settings.calibrate as u64, |i| {
+        if is_cut.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        let mut records = vec![];
+        for (r, record) in problem.records.iter().enumerate() {
+            let noise = noise
+                .child("record")
+                .sample(i * problem.records.len() as u64 + r as u64);
+            let outputs =
+                match problem
+                    .twin
+                    .simulate(&problem.of_record(r, theta), record.drive(), noise)
+                {
+                    Ok(outputs) => outputs,
+                    Err(error) if error.costs_one_run() => return Ok(None),
+                    Err(error) => return Err(error.into()),
+                };
+            records.push(Record::new(
+                record.drive().clone(),
+                record.with_gaps_in(outputs),
+            )?);
+        }
+        let value = match log_odds(&records) {
+            Ok(value) => Some(value),
+            Err(StudyError::NoFit { .. }) => None,
+            Err(StudyError::Cancelled(_)) if settings.give_partial => {
+                is_cut.store(true, Ordering::Relaxed);
                 return Ok(None);
             }
-            let mut records = vec![];
-            for (r, record) in problem.records.iter().enumerate() {
-                let noise = noise
-                    .child("record")
-                    .sample(i * problem.records.len() as u64 + r as u64);
-                let outputs =
-                    match problem
-                        .twin
-                        .simulate(&problem.of_record(r, theta), record.drive(), noise)
-                    {
-                        Ok(outputs) => outputs,
-                        Err(error) if error.costs_one_run() => return Ok(None),
-                        Err(error) => return Err(error.into()),
-                    };
-                records.push(Record::new(
-                    record.drive().clone(),
-                    record.with_gaps_in(outputs),
-                )?);
-            }
-            let value = match log_odds(&records) {
-                Ok(value) => Some(value),
-                Err(StudyError::NoFit { .. }) => None,
-                Err(StudyError::Cancelled(_)) if settings.give_partial => {
-                    is_cut.store(true, Ordering::Relaxed);
-                    return Ok(None);
-                }
-                Err(error) => return Err(error),
-            };
-            if settings.ends(stage.tick())? {
-                is_cut.store(true, Ordering::Relaxed);
-            }
-            Ok(value)
-        })
-        .collect::<Result<_, StudyError>>()?;
+            Err(error) => return Err(error),
+        };
+        if settings.ends(stage.tick())? {
+            is_cut.store(true, Ordering::Relaxed);
+        }
+        Ok::<_, StudyError>(value)
+    })?;
     Ok((values.into_iter().flatten().collect(), is_cut.into_inner()))
 }
 

@@ -5,11 +5,11 @@ use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::median;
+use crate::parallel::each;
 use crate::record::{Record, Signal};
 use crate::study::StudyError;
 use crate::twin::{Noise, Twin, begun};
 use ndarray::Array1;
-use rayon::prelude::*;
 
 /// A model that runs beside a record: free, or with its own noise.
 pub(in crate::diagnose) struct Runner {
@@ -59,16 +59,13 @@ impl Runner {
     pub fn floor(&self, record: &Record, from: usize, noise: Noise) -> Option<f64> {
         let free = self.outputs(record)?;
         let scale = variances(record.outputs());
-        let errors: Vec<f64> = (0..THRESHOLDS.floor_records)
-            .into_par_iter()
-            .filter_map(|i| {
-                let run = self.simulated(record, noise.sample(i))?;
-                // In units of the measured record, as the other errors are.
-                let errors = record.with_gaps_in(run - &free);
-                Some(root(&scaled(&errors, &scale, from)))
-            })
-            .collect();
-        median(&errors).ok()
+        let errors = each(0..THRESHOLDS.floor_records, |i| {
+            let run = self.simulated(record, noise.sample(i))?;
+            // In units of the measured record, as the other errors are.
+            let errors = record.with_gaps_in(run - &free);
+            Some(root(&scaled(&errors, &scale, from)))
+        });
+        median(&errors.into_iter().flatten().collect::<Vec<_>>()).ok()
     }
 }
 

@@ -21,10 +21,10 @@ use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::{deviation, quantile};
+use crate::parallel::{each, try_each};
 use crate::record::{Record, Signal};
 use crate::study::StudyError;
 use crate::twin::Noise;
-use rayon::prelude::*;
 
 /// Held-out data: a record, and its first row that counts.
 #[derive(Clone, Copy)]
@@ -192,14 +192,12 @@ pub(in crate::diagnose) fn compare(
 
 /// Records like the measured one, each at a draw.
 fn simulated(draws: &[Predictor], record: &Record, count: u64, noise: Noise) -> Vec<Record> {
-    (0..count)
-        .into_par_iter()
-        .filter_map(|i| {
-            let draw = draws.get(i as usize % draws.len().max(1))?;
-            let run = draw.runner.simulated(record, noise.sample(i))?;
-            Record::new(record.drive().clone(), record.with_gaps_in(run)).ok()
-        })
-        .collect()
+    let all = each(0..count, |i| {
+        let draw = draws.get(i as usize % draws.len().max(1))?;
+        let run = draw.runner.simulated(record, noise.sample(i))?;
+        Record::new(record.drive().clone(), record.with_gaps_in(run)).ok()
+    });
+    all.into_iter().flatten().collect()
 }
 
 impl Compared {
@@ -211,12 +209,10 @@ impl Compared {
         rows: HeldOutRows<'_>,
         records: &[Record],
     ) -> Result<Vec<Option<f64>>, FilterError> {
-        (records.par_iter())
-            .map(|record| {
-                let errors = of.errors(HeldOutRows { record, ..rows }, reach, &self.scale)?;
-                Ok(errors.map(|errors| mean(&errors)))
-            })
-            .collect()
+        try_each(records, |record| {
+            let errors = of.errors(HeldOutRows { record, ..rows }, reach, &self.scale)?;
+            Ok(errors.map(|errors| mean(&errors)))
+        })
     }
 
     /// Error of another model at a horizon, as a root mean square.

@@ -15,11 +15,11 @@ use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::hypothesis::search::model::{Model, keys};
 use crate::likelihood::kalman::recoverable;
+use crate::parallel::try_each;
 use crate::record::{Drive, Record, Signal};
 use crate::study::StudyError;
 use crate::twin::Noise;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Iterations of a refit.
@@ -94,10 +94,10 @@ fn best_of(
     times: usize,
     noise: Noise,
 ) -> Result<Option<Proposal>, StudyError> {
-    let looks = proposals(&records[0], times, noise)?
-        .into_par_iter()
-        .map(|proposal| Ok((first_statistics(rivals, &proposal.drive, noise)?, proposal)))
-        .collect::<Result<Vec<_>, StudyError>>()?;
+    let looks = try_each(proposals(&records[0], times, noise)?, |proposal| {
+        let nats = first_statistics(rivals, &proposal.drive, noise)?;
+        Ok::<_, StudyError>((nats, proposal))
+    })?;
     let best = (looks.into_iter()).max_by(|a, b| a.0.total_cmp(&b.0));
     Ok(best
         .filter(|(nats, _)| *nats > 0.0)
@@ -248,22 +248,19 @@ fn told_apart(
     trials: u64,
     noise: Noise,
 ) -> Result<[u64; 2], StudyError> {
-    let told = (0..trials)
-        .into_par_iter()
-        .map(|i| {
-            let truth = (i % rivals.len() as u64) as usize;
-            let Some(record) = rivals[truth].record(drive, noise.sample(i))? else {
-                return Ok(false);
-            };
-            let both: Arc<[Record]> = [records, &[record]].concat().into();
-            let scores: Vec<f64> = (rivals.iter())
-                .map(|rival| rival.evidence(&both))
-                .collect::<Result<_, StudyError>>()?;
-            let others = scores.iter().enumerate().filter(|(j, _)| *j != truth);
-            let next = others.map(|(_, s)| *s).fold(f64::NEG_INFINITY, f64::max);
-            Ok(scores[truth] > next + THRESHOLDS.rivals)
-        })
-        .collect::<Result<Vec<bool>, StudyError>>()?;
+    let told = try_each(0..trials, |i| {
+        let truth = (i % rivals.len() as u64) as usize;
+        let Some(record) = rivals[truth].record(drive, noise.sample(i))? else {
+            return Ok(false);
+        };
+        let both: Arc<[Record]> = [records, &[record]].concat().into();
+        let scores: Vec<f64> = (rivals.iter())
+            .map(|rival| rival.evidence(&both))
+            .collect::<Result<_, StudyError>>()?;
+        let others = scores.iter().enumerate().filter(|(j, _)| *j != truth);
+        let next = others.map(|(_, s)| *s).fold(f64::NEG_INFINITY, f64::max);
+        Ok::<_, StudyError>(scores[truth] > next + THRESHOLDS.rivals)
+    })?;
     Ok([told.iter().filter(|t| **t).count() as u64, trials])
 }
 

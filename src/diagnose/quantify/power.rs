@@ -16,8 +16,8 @@ use crate::fit::reference::Reference;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::kalman::recoverable;
+use crate::parallel::try_each;
 use crate::study::StudyError;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The smallest visible magnitude of each listed effect.
@@ -29,18 +29,16 @@ pub(in crate::diagnose) fn power(
         return Ok(vec![]);
     };
     let need = (2.0 * THRESHOLDS.seen).sqrt() + THRESHOLDS.power_quantile;
-    let each: Vec<(String, Visible, f64)> = (terms.par_iter())
-        .map(|term| {
-            let (value, distance) = smallest(model, &reference, term, need)?;
-            let visible = Visible {
-                id: term.id.clone(),
-                target: term.target.clone(),
-                magnitude: first_magnitude(term),
-                value,
-            };
-            Ok((term.key(), visible, distance))
-        })
-        .collect::<Result<_, StudyError>>()?;
+    let each = try_each(terms, |term| {
+        let (value, distance) = smallest(model, &reference, term, need)?;
+        let visible = Visible {
+            id: term.id.clone(),
+            target: term.target.clone(),
+            magnitude: first_magnitude(term),
+            value,
+        };
+        Ok::<_, StudyError>((term.key(), visible, distance))
+    })?;
     // Of several ways to use one effect, the one that shows best.
     let mut best: Vec<(String, Visible, f64)> = vec![];
     for way in each {

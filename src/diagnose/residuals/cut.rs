@@ -184,11 +184,32 @@ pub(in crate::diagnose) fn edges(values: &[f64]) -> Vec<f64> {
     edges
 }
 
+/// Windows of a record, one sample each at least.
 fn windows(record: usize, channel: usize, samples: usize) -> impl Iterator<Item = Cut> {
-    (0..THRESHOLDS.windows).map(move |w| Cut::Window {
+    let count = THRESHOLDS.windows.min(samples);
+    (0..count).map(move |w| Cut::Window {
         record,
         channel,
-        from: w * samples / THRESHOLDS.windows,
-        to: (w + 1) * samples / THRESHOLDS.windows,
+        from: w * samples / count,
+        to: (w + 1) * samples / count,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fewer samples than windows, too.
+    #[test]
+    fn windows_hold_each_sample_once() {
+        for samples in 0..50 {
+            let held: Vec<usize> = windows(0, 0, samples)
+                .flat_map(|cut| match cut {
+                    Cut::Window { from, to, .. } if from < to => from..to,
+                    other => panic!("{samples} samples: {other:?}"),
+                })
+                .collect();
+            assert_eq!(held, (0..samples).collect::<Vec<_>>());
+        }
+    }
 }

@@ -5,8 +5,8 @@ use super::evidence::Evidence;
 use super::explanations::Explanations;
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::set::TermSet;
+use crate::parallel::try_each;
 use crate::study::StudyError;
-use rayon::prelude::*;
 
 /// Explanations of a kind, best first.
 struct List<'k> {
@@ -24,16 +24,14 @@ impl<E: Evidence> Search<E> {
         let old = &self.known;
         let ratio = new.rows().0 as f64 / self.evidence.rows().0 as f64;
         let lists = self.lists(ratio > 1.0);
-        let fitted: Vec<Vec<Option<Explanation>>> = (lists.par_iter())
-            .map(|list| {
-                let best = list.all.par_iter().take(list.most);
-                best.map(|e| match old.gain(e) > list.least {
+        let fitted = try_each(&lists, |list| {
+            try_each(list.all.iter().take(list.most), |e| {
+                match old.gain(e) > list.least {
                     true => new.carried(e),
                     false => Ok(None),
-                })
-                .collect()
+                }
             })
-            .collect::<Result<_, StudyError>>()?;
+        })?;
         let mut known = Explanations::new(new.twin());
         let twin = known.twin().log_z;
         for (list, fitted) in lists.iter().zip(fitted) {

@@ -19,9 +19,9 @@ use crate::hypothesis::search::{Before, Breadth, listed, unknown as functions};
 use crate::hypothesis::shared;
 use crate::hypothesis::term::Term;
 use crate::hypothesis::unknown::unknown;
+use crate::parallel::try_each;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
-use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -245,13 +245,11 @@ impl<'s> Setup<'s> {
         }
         let own = models.iter().map(|model| model.log_evidence);
         let least = own.fold(f64::NEG_INFINITY, f64::max);
-        let is_likelier: Vec<bool> = (models.into_par_iter())
-            .map(|model| {
-                let problem = model.problem_of(&twin)?;
-                let finer = Model { problem, ..model }.carried_on()?;
-                Ok(finer.is_some_and(|finer| finer.log_evidence > least))
-            })
-            .collect::<Result<_, StudyError>>()?;
+        let is_likelier = try_each(models, |model| {
+            let problem = model.problem_of(&twin)?;
+            let finer = Model { problem, ..model }.carried_on()?;
+            Ok::<_, StudyError>(finer.is_some_and(|finer| finer.log_evidence > least))
+        })?;
         Ok(is_likelier.contains(&true))
     }
 }

@@ -9,7 +9,7 @@ use super::error::EquationsError;
 use super::graph::{Graph, Id, Node, Varies};
 use super::names::Scope;
 use super::operation::Binary;
-use super::place::{SourceText, number};
+use super::place::{SourceText, in_order, number};
 use super::tape::OperationTape;
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::excerpt;
@@ -130,9 +130,7 @@ fn changes(
         let Some(table) = value.get_ref().as_table() else {
             return entry.wrong(key, value, "states with their values, { h = \"0.5*h\" }");
         };
-        let mut all: Vec<_> = table.iter().collect();
-        all.sort_by_key(|(name, _)| name.span().start);
-        for (name, value) in all {
+        for (name, value) in in_order(table) {
             let byte = name.span().start;
             let name: &str = name.get_ref();
             let Some(state) = states.iter().position(|state| *state == name) else {

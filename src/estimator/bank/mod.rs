@@ -18,7 +18,7 @@ use crate::estimator::error::EstimatorError;
 use crate::feature::FeatureRecipe;
 use crate::progress::Stage;
 use crate::record::Drive;
-use crate::study::{DriveSource, Study};
+use crate::study::{DriveSource, Study, StudyError};
 use crate::twin::{Noise, ParameterSpace};
 use ndarray::{Array2, s};
 use std::borrow::Cow;
@@ -146,9 +146,7 @@ impl Prior {
             rows,
             |i| Noise::new(seed, purpose, i),
             |_, _, noise| {
-                let drive = (self.drives.draw(noise)).map_err(|error| {
-                    EstimatorError::Bank(format!("the input cannot be made: {error}"))
-                })?;
+                let drive = self.drives.draw(noise).map_err(StudyError::from)?;
                 Ok(Some((self.space.draw_prior(noise), Cow::Owned(drive))))
             },
             stage,

@@ -4,12 +4,12 @@ use super::{Draw, Draws};
 use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
+use crate::parallel::{each, try_each};
 use crate::progress::Stage;
 use crate::record::{Drive, Record, Signal, check_sizes};
 use crate::twin::{Noise, Twin};
 use nalgebra::DVector;
 use ndarray::{Array2, aview1};
-use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
@@ -137,18 +137,16 @@ impl FeatureSimulator {
         seeds: usize,
     ) -> Result<DVector<f64>, EstimatorError> {
         let samples: Vec<u64> = (0..seeds as u64).collect();
-        let runs: Vec<Vec<f64>> = (samples.par_chunks(self.at_once()))
-            .flat_map_iter(|samples| {
-                let all: Vec<_> = (samples.iter())
-                    .map(|&sample| (theta, drive, noise(sample)))
-                    .collect();
-                self.features(&all)
-            })
-            .collect::<Result<_, _>>()?;
+        let runs = each(samples.chunks(self.at_once()), |samples| {
+            let all: Vec<_> = (samples.iter())
+                .map(|&sample| (theta, drive, noise(sample)))
+                .collect();
+            self.features(&all)
+        });
         // Summed in order: the same bits for any number of threads.
         let mut mean = DVector::zeros(self.dim());
-        for run in runs {
-            mean += DVector::from_vec(run);
+        for run in runs.into_iter().flatten() {
+            mean += DVector::from_vec(run?);
         }
         Ok(mean / seeds as f64)
     }
@@ -180,13 +178,11 @@ impl FeatureSimulator {
         stage: &Stage,
     ) -> Result<Draws, EstimatorError> {
         let numbers: Vec<u64> = rows.collect();
-        let chunks = (numbers.par_chunks(self.at_once()))
-            .map(|numbers| {
-                let rows = self.chunk(numbers, &noise, &draw)?;
-                numbers.iter().try_for_each(|_| stage.tick())?;
-                Ok(rows)
-            })
-            .collect::<Result<Vec<_>, EstimatorError>>()?;
+        let chunks = try_each(numbers.chunks(self.at_once()), |numbers| {
+            let rows = self.chunk(numbers, &noise, &draw)?;
+            numbers.iter().try_for_each(|_| stage.tick())?;
+            Ok::<_, EstimatorError>(rows)
+        })?;
         let rows: Vec<DrawnRow> = chunks.into_iter().flatten().collect();
         let failed: usize = rows.iter().map(|row| row.failed).sum();
         let tried = rows.len() + failed;

@@ -21,10 +21,10 @@ use crate::estimator::gate::{GateTest, whiten};
 use crate::estimator::settings::RefineSettings;
 use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem, space_filling};
 use crate::math::{MathError, Stencil, Whitening, thin_svd};
+use crate::parallel::try_each;
 use crate::progress::Stage;
 use crate::twin::{Interval, Noise};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 /// The refined estimate, with what was simulated around it.
 #[derive(Debug, Clone)]
@@ -343,15 +343,13 @@ impl MeanFeatures<'_> {
                 .collect::<Result<_, EstimatorError>>()?;
             Ok(stencil.assemble(&values))
         };
-        (0..self.seeds as u64).into_par_iter().map(one).collect()
+        try_each(0..self.seeds as u64, one)
     }
 
     /// ∂f̄/∂θ: the same seeds on both sides of θ.
     fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
         let stencil = self.stencil(theta)?;
-        let values: Vec<DVector<f64>> = (stencil.points().par_iter())
-            .map(|point| self.at(point))
-            .collect::<Result<_, _>>()?;
+        let values = try_each(stencil.points(), |point| self.at(point))?;
         Ok(stencil.assemble(&values))
     }
 

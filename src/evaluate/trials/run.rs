@@ -15,6 +15,7 @@ use crate::diagnose::{DiagnoseSettings, greedy};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::{EvaluateError, MOST_RECORDS};
 use crate::likelihood::kalman::recoverable;
+use crate::parallel::try_each;
 use crate::progress::Progress;
 use crate::record::record_csv_text;
 use crate::setting::SettingError;
@@ -23,7 +24,6 @@ use crate::storage::checksum::sha256;
 use crate::storage::work::{Manifest, Piece, Pieces, Share};
 use crate::study::Study;
 use crate::twin::Noise;
-use rayon::prelude::*;
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
@@ -109,7 +109,7 @@ impl<'a> Withheld<'a> {
                 stage.tick()?;
                 Ok::<_, EvaluateError>(drawn)
             };
-            let drawn = part.par_iter().map(draw).collect::<Result<Vec<_>, _>>()?;
+            let drawn = try_each(part, draw)?;
             for drawn in drawn {
                 let records = [
                     (Which::Own, Some(&drawn.record)),

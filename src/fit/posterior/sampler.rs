@@ -7,9 +7,9 @@ use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
 use crate::math::log_mean;
+use crate::parallel::try_each;
 use crate::twin::Source;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 /// Degrees of freedom of a proposal: heavier tails than a posterior's.
@@ -178,16 +178,14 @@ impl Round {
         for (&i, value) in possible.iter().zip(problem.log_likelihoods(&thetas)?) {
             targets[i] += value.unwrap_or(f64::NEG_INFINITY);
         }
-        let of_proposals = (draws.par_iter().enumerate())
-            .map(|(i, phi)| {
-                heard(problem, i)?;
-                let densities: Vec<f64> = proposals.iter().map(|q| q.log_density(phi)).collect();
-                let mode = (0..densities.len())
-                    .max_by(|&a, &b| densities[a].total_cmp(&densities[b]))
-                    .unwrap_or(0);
-                Ok((mode, log_mean(&densities)))
-            })
-            .collect::<Result<Vec<(usize, f64)>, FilterError>>()?;
+        let of_proposals = try_each(draws.iter().enumerate(), |(i, phi)| {
+            heard(problem, i)?;
+            let densities: Vec<f64> = proposals.iter().map(|q| q.log_density(phi)).collect();
+            let mode = (0..densities.len())
+                .max_by(|&a, &b| densities[a].total_cmp(&densities[b]))
+                .unwrap_or(0);
+            Ok::<_, FilterError>((mode, log_mean(&densities)))
+        })?;
         let logs: Vec<f64> = (targets.iter().zip(&of_proposals))
             .map(|(target, (_, mixture))| target - mixture)
             .collect();

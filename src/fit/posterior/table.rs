@@ -3,10 +3,10 @@
 use super::resampling::PosteriorSample;
 use crate::fit::problem::{Problem, of_record};
 use crate::likelihood::kalman::{FilterError, Gaussian};
+use crate::parallel::try_each;
 use crate::twin::{Noise, Role, is_memory};
 use nalgebra::{DMatrix, DVector};
 use ndarray::Array2;
-use rayon::prelude::*;
 use serde::Serialize;
 
 /// Posterior draws of parameters, noise levels and starts, given the records: likelihood times weak priors, within the bounds.
@@ -81,19 +81,17 @@ pub(in crate::fit) fn table(
             names.push(of_record(start, r));
         }
     }
-    let rows: Vec<Vec<f64>> = (draws.thetas.par_iter().enumerate())
-        .map(|(i, theta)| {
-            let mut row: Vec<f64> = own.iter().map(|&j| theta[j]).collect();
-            if !states.is_empty() {
-                let noise = noise.sample(i as u64);
-                for (r, first) in problem.first_states(theta)?.iter().enumerate() {
-                    let start = drawn(first, noise.child(&format!("record {r}")));
-                    row.extend(states.iter().map(|&i| start[i]));
-                }
+    let rows = try_each(draws.thetas.iter().enumerate(), |(i, theta)| {
+        let mut row: Vec<f64> = own.iter().map(|&j| theta[j]).collect();
+        if !states.is_empty() {
+            let noise = noise.sample(i as u64);
+            for (r, first) in problem.first_states(theta)?.iter().enumerate() {
+                let start = drawn(first, noise.child(&format!("record {r}")));
+                row.extend(states.iter().map(|&i| start[i]));
             }
-            Ok(row)
-        })
-        .collect::<Result<_, FilterError>>()?;
+        }
+        Ok::<_, FilterError>(row)
+    })?;
     let shape = (rows.len(), names.len());
     Ok(Posterior {
         values: Array2::from_shape_fn(shape, |(i, j)| rows[i][j]),

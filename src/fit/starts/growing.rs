@@ -15,7 +15,7 @@ use crate::twin::Noise;
 ///
 /// Searches move where many rows agree, and a long record repeats what its beginning tells: to find tops there, and to end them on all rows,
 /// takes a few passes of the whole in place of all. A sketch may be long enough for one of its own.
-pub(super) fn sketch(problem: &Problem) -> Option<Problem> {
+pub(in crate::fit) fn sketch(problem: &Problem) -> Option<Problem> {
     let share = BUDGET.sketched_rows as f64 / problem.samples() as f64;
     let share = share.max(BUDGET.sketched_share);
     (share < BUDGET.grown_shares[0] && !problem.is_simulated()).then(|| begun(problem, share))

@@ -14,8 +14,8 @@ use crate::fit::budget::{BUDGET, ITERATIONS};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
+use crate::parallel::try_each;
 use crate::twin::Noise;
-use rayon::prelude::*;
 
 /// Starts of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -248,8 +248,7 @@ fn once_each<T: Sync, R: Clone + Send>(
             })
         })
         .collect();
-    let found = firsts.into_par_iter().map(&work);
-    let found = found.collect::<Result<Vec<R>, FilterError>>()?;
+    let found = try_each(firsts, work)?;
     Ok(of.into_iter().map(|i| found[i].clone()).collect())
 }
 

@@ -9,8 +9,8 @@ use crate::fit::spectral_starts;
 use crate::fit::starts::{Care, search};
 use crate::hypothesis::limits::SEARCH;
 use crate::likelihood::kalman::FilterError;
+use crate::parallel::try_each;
 use crate::twin::Noise;
-use rayon::prelude::*;
 
 /// Shares of the step to the top of the quadratic that a function's fit may begin at.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.0];
@@ -119,27 +119,25 @@ pub(crate) fn anneal(
     let c = &held.problem.coordinates;
     let quiet = (model.problem.coordinates).of(&model.fitted.theta);
     let loudest = (loud.problem.coordinates).of(&loud.fitted.theta);
-    (promise.starts.par_iter().take(starts))
-        .map(|start| {
-            let mut theta = begin(loud, &held, start)?;
-            let mut last = None;
-            for share in [0.0, 0.5] {
-                let mut phi = c.of(&theta);
-                for (j, axis) in loud.problem.axes.iter().enumerate() {
-                    if axis.begin.is_some() {
-                        phi[j] = (1.0 - share) * loudest[j] + share * quiet[j];
-                    }
+    let fits = try_each(promise.starts.iter().take(starts), |start| {
+        let mut theta = begin(loud, &held, start)?;
+        let mut last = None;
+        for share in [0.0, 0.5] {
+            let mut phi = c.of(&theta);
+            for (j, axis) in loud.problem.axes.iter().enumerate() {
+                if axis.begin.is_some() {
+                    phi[j] = (1.0 - share) * loudest[j] + share * quiet[j];
                 }
-                let Some(fitted) = climb(&held.problem, &c.theta(&phi), SEARCH.held)? else {
-                    return Ok(None);
-                };
-                theta.clone_from(&fitted.theta);
-                last = Some(fitted);
             }
-            Ok(last)
-        })
-        .filter_map(Result::transpose)
-        .collect()
+            let Some(fitted) = climb(&held.problem, &c.theta(&phi), SEARCH.held)? else {
+                return Ok(None);
+            };
+            theta.clone_from(&fitted.theta);
+            last = Some(fitted);
+        }
+        Ok::<_, FilterError>(last)
+    })?;
+    Ok(fits.into_iter().flatten().collect())
 }
 
 /// Fits a promise from where its noise was let down half-way, noise free.
@@ -149,10 +147,9 @@ pub(crate) fn release(
     begun: &[Fitted],
 ) -> Result<Option<Model>, FilterError> {
     let free = model.extend(&promise.term)?;
-    let fits: Vec<Fitted> = (begun.par_iter())
-        .filter_map(|begun| climb(&free.problem, &begun.theta, SEARCH.released).transpose())
-        .collect::<Result<_, _>>()?;
-    let best = (fits.into_iter()).reduce(|a, b| if b.objective > a.objective { b } else { a });
+    let released = |begun: &Fitted| climb(&free.problem, &begun.theta, SEARCH.released);
+    let fits = try_each(begun, released)?.into_iter().flatten();
+    let best = fits.reduce(|a, b| if b.objective > a.objective { b } else { a });
     Ok(best.and_then(|fitted| free.fitted(model.base.clone(), fitted)))
 }
 

@@ -17,14 +17,14 @@ pub(crate) use crate::hypothesis::limits::SEARCH;
 pub(crate) use breadth::Breadth;
 pub(crate) use rivals::unknown;
 
-use crate::fit::climb::{Fitted, climb};
+use crate::fit::climb::climb;
 use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::{Term, marks};
 use crate::likelihood::kalman::FilterError;
+use crate::parallel::try_each;
 use explanation::{Explanation, sort};
 use fits::{Effort, anneal, fit_afresh, fit_promise, fit_unfolded, loudly, release};
 use model::Model;
-use rayon::prelude::*;
 use screen::{Promise, scan};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -155,17 +155,18 @@ fn first_fits(
         starts: 2,
         iterations: 6,
     };
-    (chosen.par_iter())
-        .filter_map(|promise| fit_promise(model, promise, thetas, effort).transpose())
-        .collect()
+    let fits = try_each(chosen, |promise| {
+        fit_promise(model, promise, thetas, effort)
+    })?;
+    Ok(fits.into_iter().flatten().collect())
 }
 
 /// Fits of all terms from the prior's centre and from unfolded records: beside the twin where it is, the right one may promise nothing.
 fn fresh_fits(model: &Model, promises: &[Promise]) -> Result<Vec<Model>, FilterError> {
-    (promises.par_iter())
-        .flat_map_iter(|promise| [fit_afresh(model, promise), fit_unfolded(model, promise)])
-        .filter_map(Result::transpose)
-        .collect()
+    let fits = try_each(promises, |promise| {
+        Ok::<_, FilterError>([fit_afresh(model, promise)?, fit_unfolded(model, promise)?])
+    })?;
+    Ok(fits.into_iter().flatten().flatten().collect())
 }
 
 /// The same from loud noise, of the terms that promise most there. Noise is let down to that of the model for those that are near the best by
@@ -180,18 +181,15 @@ fn annealed_fits(
         .take(breadth.annealed)
         .filter(|promise| promise.nats() > breadth.least)
         .collect();
-    let begun: Vec<Vec<Fitted>> = (promises.par_iter())
-        .map(|promise| anneal(model, loud, promise, 2))
-        .collect::<Result<_, FilterError>>()?;
+    let begun = try_each(&promises, |promise| anneal(model, loud, promise, 2))?;
     let best = (begun.iter().flatten())
         .map(|fitted| fitted.objective)
         .fold(f64::NEG_INFINITY, f64::max);
-    (promises.par_iter().zip(begun))
-        .filter_map(|(promise, mut begun)| {
-            begun.retain(|fitted| fitted.objective > best - SEARCH.lost);
-            release(model, promise, &begun).transpose()
-        })
-        .collect()
+    let fits = try_each(promises.iter().zip(begun), |(promise, mut begun)| {
+        begun.retain(|fitted| fitted.objective > best - SEARCH.lost);
+        release(model, promise, &begun)
+    })?;
+    Ok(fits.into_iter().flatten().collect())
 }
 
 /// Gives those near the best more starts, and carries them on.
@@ -205,42 +203,40 @@ fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Resul
         .take(2)
         .filter_map(Explanation::own_theta)
         .collect();
-    let better: Vec<Option<Explanation>> = (all.par_iter().enumerate())
-        .map(|(i, found)| {
-            if !is_near(i, found.log_z) || !is_worth(i, found.log_z) {
-                return Ok(None);
+    let better = try_each(all.iter().enumerate(), |(i, found)| {
+        if !is_near(i, found.log_z) || !is_worth(i, found.log_z) {
+            return Ok(None);
+        }
+        let own = found.own_theta();
+        let thetas: Vec<Vec<f64>> = (best.iter())
+            .filter(|theta| own.as_ref() != Some(theta))
+            .cloned()
+            .collect();
+        let effort = Effort {
+            starts: match found.last().shape() {
+                Some(_) => SEARCH.starts_of_shape,
+                None => 3,
+            },
+            iterations: 12,
+        };
+        let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, found.last()));
+        let fitted = match promise {
+            Some(promise) => fit_promise(model, promise, &thetas, effort)?,
+            None => None,
+        };
+        let carried = match &found.model {
+            Some(m) => climb(&m.problem, &m.fitted.theta, SEARCH.carried)?
+                .and_then(|fitted| m.refitted(fitted)),
+            None => None,
+        };
+        let best = [fitted, carried].into_iter().flatten().reduce(|a, b| {
+            match b.fitted.objective > a.fitted.objective {
+                true => b,
+                false => a,
             }
-            let own = found.own_theta();
-            let thetas: Vec<Vec<f64>> = (best.iter())
-                .filter(|theta| own.as_ref() != Some(theta))
-                .cloned()
-                .collect();
-            let effort = Effort {
-                starts: match found.last().shape() {
-                    Some(_) => SEARCH.starts_of_shape,
-                    None => 3,
-                },
-                iterations: 12,
-            };
-            let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, found.last()));
-            let fitted = match promise {
-                Some(promise) => fit_promise(model, promise, &thetas, effort)?,
-                None => None,
-            };
-            let carried = match &found.model {
-                Some(m) => climb(&m.problem, &m.fitted.theta, SEARCH.carried)?
-                    .and_then(|fitted| m.refitted(fitted)),
-                None => None,
-            };
-            let best = [fitted, carried].into_iter().flatten().reduce(|a, b| {
-                match b.fitted.objective > a.fitted.objective {
-                    true => b,
-                    false => a,
-                }
-            });
-            Ok(best.map(Explanation::of))
-        })
-        .collect::<Result<_, FilterError>>()?;
+        });
+        Ok::<_, FilterError>(best.map(Explanation::of))
+    })?;
     for (own, better) in all.iter_mut().zip(better) {
         if let Some(better) = better.filter(|better| better.log_z > own.log_z) {
             *own = better;

@@ -12,7 +12,7 @@ use crate::hypothesis::limits::SEARCH;
 use crate::hypothesis::term::{Nature, Term};
 use crate::likelihood::kalman::FilterError;
 use crate::math::{descending, log_mean, median};
-use rayon::prelude::*;
+use crate::parallel::try_each;
 use std::sync::Arc;
 
 /// A hypothesis before it is weighed against others: its terms, its nats, and its fit where it was worth one.
@@ -73,17 +73,15 @@ fn weighed(
     breadth: Breadth,
 ) -> Result<Vec<Weighed>, FilterError> {
     let linear = functions(model, terms)?;
-    (linear.into_par_iter().enumerate())
-        .map(|(i, linear)| {
-            let (terms, gain) = (linear.extended.terms.clone(), linear.gain - price);
-            let iterations = if gain > 10.0 { 6 } else { 4 };
-            let fitted = match i < breadth.functions && linear.gain > breadth.least {
-                true => fit_function(model, linear, iterations)?,
-                false => None,
-            };
-            Ok((terms, gain, fitted))
-        })
-        .collect()
+    try_each(linear.into_iter().enumerate(), |(i, linear)| {
+        let (terms, gain) = (linear.extended.terms.clone(), linear.gain - price);
+        let iterations = if gain > 10.0 { 6 } else { 4 };
+        let fitted = match i < breadth.functions && linear.gain > breadth.least {
+            true => fit_function(model, linear, iterations)?,
+            false => None,
+        };
+        Ok((terms, gain, fitted))
+    })
 }
 
 /// Disturbances beside a model, so many of the best of them refitted.
@@ -100,20 +98,18 @@ fn disturbances(
         .collect();
     let mut order: Vec<usize> = (0..rough.len()).collect();
     descending(&mut order, |&i| rough[i]);
-    (order.into_par_iter().enumerate())
-        .map(|(n, i)| {
-            let is_worth = rough[i] > 0.0 || promises[i].nats() > breadth.least;
-            let effort = Effort {
-                starts: 2,
-                iterations: 6,
-            };
-            let fitted = match n < breadth.functions && is_worth {
-                true => fit_promise(model, &promises[i], &[], effort)?,
-                false => None,
-            };
-            Ok((beside(model, &promises[i].term), rough[i], fitted))
-        })
-        .collect()
+    try_each(order.into_iter().enumerate(), |(n, i)| {
+        let is_worth = rough[i] > 0.0 || promises[i].nats() > breadth.least;
+        let effort = Effort {
+            starts: 2,
+            iterations: 6,
+        };
+        let fitted = match n < breadth.functions && is_worth {
+            true => fit_promise(model, &promises[i], &[], effort)?,
+            false => None,
+        };
+        Ok((beside(model, &promises[i].term), rough[i], fitted))
+    })
 }
 
 /// The explanations that hypotheses of one kind are: those that were not refitted count as the refits tell.

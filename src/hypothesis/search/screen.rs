@@ -9,8 +9,8 @@ use crate::fit::reference::Reference;
 use crate::hypothesis::term::{Start, Term, marks};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::descending;
+use crate::parallel::try_each;
 use nalgebra::DVector;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A term and its best starts.
@@ -57,21 +57,18 @@ pub(crate) fn scan_from(
     reference: &Reference,
     terms: &[Arc<Term>],
 ) -> Result<Vec<Promise>, FilterError> {
-    let mut all: Vec<Promise> = (terms.par_iter())
-        .map(|term| {
-            let extended = model.extend(term)?;
-            let mut starts: Vec<Beginning> = (term.starts.par_iter())
-                .map(|start| promise(model, reference, &extended, start))
-                .filter_map(Result::transpose)
-                .collect::<Result<_, FilterError>>()?;
-            descending(&mut starts, |a| a.nats);
-            Ok(Promise {
-                term: term.clone(),
-                mark: marks(model.terms.iter().chain([term])) - marks(&model.terms),
-                starts,
-            })
+    let mut all = try_each(terms, |term| {
+        let extended = model.extend(term)?;
+        let start = |start| promise(model, reference, &extended, start);
+        let starts = try_each(&term.starts, start)?;
+        let mut starts: Vec<Beginning> = starts.into_iter().flatten().collect();
+        descending(&mut starts, |a| a.nats);
+        Ok::<_, FilterError>(Promise {
+            term: term.clone(),
+            mark: marks(model.terms.iter().chain([term])) - marks(&model.terms),
+            starts,
         })
-        .collect::<Result<_, FilterError>>()?;
+    })?;
     all.retain(|promise| !promise.starts.is_empty());
     descending(&mut all, |a| a.nats());
     Ok(all)
@@ -137,34 +134,31 @@ pub(crate) struct Linear {
 
 /// Unknown functions beside a model, best first.
 pub(crate) fn functions(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Linear>, FilterError> {
-    let mut all: Vec<Linear> = (terms.par_iter())
-        .map(|term| {
-            let extended = model.extend(term)?;
-            let mut best: Option<(f64, Laplace, Vec<f64>)> = None;
-            for start in &term.starts {
-                let theta = model.beside(&extended, &start.m);
-                let Some(fitted) = extended.at(&theta)? else {
-                    continue;
-                };
-                let Some((log_evidence, found)) =
-                    laplace(&extended.problem, &fitted, f64::INFINITY)
-                else {
-                    continue;
-                };
-                let gain = log_evidence + marks(&model.terms) - model.log_evidence;
-                if best.as_ref().is_none_or(|(b, ..)| gain > *b) {
-                    best = Some((gain, found, theta));
-                }
+    let linear = try_each(terms, |term| {
+        let extended = model.extend(term)?;
+        let mut best: Option<(f64, Laplace, Vec<f64>)> = None;
+        for start in &term.starts {
+            let theta = model.beside(&extended, &start.m);
+            let Some(fitted) = extended.at(&theta)? else {
+                continue;
+            };
+            let Some((log_evidence, found)) = laplace(&extended.problem, &fitted, f64::INFINITY)
+            else {
+                continue;
+            };
+            let gain = log_evidence + marks(&model.terms) - model.log_evidence;
+            if best.as_ref().is_none_or(|(b, ..)| gain > *b) {
+                best = Some((gain, found, theta));
             }
-            Ok(best.map(|(gain, found, theta)| Linear {
-                extended,
-                gain,
-                found,
-                theta,
-            }))
-        })
-        .filter_map(Result::transpose)
-        .collect::<Result<_, FilterError>>()?;
+        }
+        Ok::<_, FilterError>(best.map(|(gain, found, theta)| Linear {
+            extended,
+            gain,
+            found,
+            theta,
+        }))
+    })?;
+    let mut all: Vec<Linear> = linear.into_iter().flatten().collect();
     descending(&mut all, |a| a.gain);
     Ok(all)
 }

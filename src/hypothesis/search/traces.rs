@@ -16,8 +16,8 @@ use crate::hypothesis::term::Term;
 use crate::hypothesis::trace::Trail;
 use crate::likelihood::kalman::{FilterError, Responses, recoverable};
 use crate::math::{descending, log_mean};
+use crate::parallel::each;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -108,16 +108,14 @@ impl<'s> TraceScreen<'s> {
     /// Nats of each function. Those of one trace share its values: they stand side by side.
     fn gains(&self, terms: &[Arc<Term>]) -> Vec<f64> {
         let source = |term: &Arc<Term>| term.trail.map(|t| (t.of, t.trace, t.ends));
-        let groups: Vec<&[Arc<Term>]> = (terms.chunk_by(|a, b| source(a) == source(b))).collect();
-        let gains: Vec<Vec<f64>> = (groups.par_iter())
-            .map(|group| {
-                let courses = group[0].trail.map(|trail| self.courses(&trail));
-                let gain = |term: &Arc<Term>| self.gain(term, courses.as_deref()?);
-                (group.iter())
-                    .map(|term| gain(term).unwrap_or(f64::NEG_INFINITY))
-                    .collect()
-            })
-            .collect();
+        let groups = terms.chunk_by(|a, b| source(a) == source(b));
+        let gains = each(groups, |group| -> Vec<f64> {
+            let courses = group[0].trail.map(|trail| self.courses(&trail));
+            let gain = |term: &Arc<Term>| self.gain(term, courses.as_deref()?);
+            (group.iter())
+                .map(|term| gain(term).unwrap_or(f64::NEG_INFINITY))
+                .collect()
+        });
         gains.concat()
     }
 

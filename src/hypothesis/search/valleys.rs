@@ -7,7 +7,7 @@ use crate::fit::climb::{Fitted, climb, fit};
 use crate::hypothesis::limits::{SEARCH, TERM};
 use crate::hypothesis::term::Term;
 use crate::likelihood::kalman::FilterError;
-use rayon::prelude::*;
+use crate::parallel::try_each;
 
 /// θ of the twin and magnitudes.
 type Start = (Vec<f64>, Vec<f64>);
@@ -21,10 +21,7 @@ pub(super) fn leave_valleys(
 ) -> Result<(), FilterError> {
     let top = all.first().map_or(floor, |f| f.log_z);
     let least = (top - SEARCH.candidates).max(floor + SEARCH.null_like);
-    let better: Vec<Option<Explanation>> = (0..all.len())
-        .into_par_iter()
-        .map(|i| again(model, &all[i], &all[..i], least))
-        .collect::<Result<_, FilterError>>()?;
+    let better = try_each(0..all.len(), |i| again(model, &all[i], &all[..i], least))?;
     for (old, new) in all.iter_mut().zip(better) {
         if let Some(new) = new.filter(|new| new.log_z > old.log_z) {
             *old = new;

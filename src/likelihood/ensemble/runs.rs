@@ -1,13 +1,11 @@
 //! Runs of a twin at one θ under one drive, with draws that are the same at every θ.
 
+use crate::parallel::try_each;
 use crate::record::{Drive, Signal};
 use crate::twin::{DigitalTwin, Noise, SimulationError};
-use rayon::prelude::*;
 
 /// Runs of an ensemble. A row is predicted from a few numbers, each of which costs one of as many degrees of freedom.
 pub(crate) const RUNS: usize = 64;
-/// Runs that a thread takes at once.
-const AT_ONCE: usize = 8;
 
 /// Mean and deviations of runs, by row and output.
 pub(crate) struct Ensemble {
@@ -26,11 +24,8 @@ impl Ensemble {
     ) -> Result<Self, SimulationError> {
         drive.check_uniform().map_err(SimulationError::of)?;
         let noise = Noise::new(0, "ensemble", 0);
-        let runs: Vec<Signal> = (0..RUNS)
-            .into_par_iter()
-            .with_min_len(AT_ONCE)
-            .filter_map(|i| run(twin, theta, drive, noise.sample(i as u64)).transpose())
-            .collect::<Result<_, _>>()?;
+        let runs = try_each(0..RUNS, |i| run(twin, theta, drive, noise.sample(i as u64)))?;
+        let runs: Vec<Signal> = runs.into_iter().flatten().collect();
         if runs.len() < RUNS / 2 {
             return Err(SimulationError::Diverged { at: drive.time(0) });
         }

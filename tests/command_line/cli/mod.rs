@@ -20,15 +20,6 @@ fn truetwin(arguments: &[&str]) -> Output {
     .unwrap()
 }
 
-/// A study of short records and few effects, for trials whose order of work is tested; returns its path.
-pub(crate) fn few_effects(folder: &Path) -> String {
-    let path = folder.join("few.toml");
-    let study = "twin = 'van-der-pol'\n[record]\nsamples = 100\n\
-                 [library]\nonly = ['sensor-bias', 'sensor-gain', 'linear-loss']\n";
-    fs::write(&path, study).unwrap();
-    path.display().to_string()
-}
-
 /// Exit 2, nothing on standard output, one line on standard error that has these parts.
 fn refused(arguments: &[&str], parts: &[&str]) {
     let output = truetwin(arguments);

@@ -1,6 +1,7 @@
 //! `withheld` as a user meets it.
 
-use super::{done, few_effects, json, refused};
+use super::{done, json, refused};
+use crate::studies::short;
 use std::fs;
 use std::path::Path;
 
@@ -10,7 +11,7 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
     let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     fs::create_dir_all(&place).unwrap();
     let out = place.join("trials").display().to_string();
-    let few = few_effects(&place);
+    let few = short(&place);
     let call = |seed: &'static str| {
         [
             "withheld",

@@ -10,8 +10,8 @@ use crate::likelihood::kalman::size::{Any, Size, with_size};
 use crate::likelihood::kalman::update::Readings;
 use crate::likelihood::kalman::{FilterError, Kalman, Method, recoverable};
 use crate::math::{Kernel, LANES, Lanes, is_wide, wide};
+use crate::parallel::try_each;
 use crate::twin::MOST_STATES;
-use rayon::prelude::*;
 
 /// So many filters take longer in lanes than one after the other: all lanes cost about two and a half of them.
 const TOO_FEW: usize = 2;
@@ -128,7 +128,7 @@ impl Kalman<'_> {
     ) -> Result<Vec<Option<f64>>, FilterError> {
         let alone = |theta: &Vec<f64>| recoverable(self.log_likelihood(theta));
         if !self.fits_lanes() {
-            return thetas.par_iter().map(alone).collect();
+            return try_each(thetas, alone);
         }
         let some = |thetas: &[Vec<f64>]| -> Result<Vec<Option<f64>>, FilterError> {
             let all: Vec<_> = thetas.iter().map(|theta| (self, &theta[..])).collect();
@@ -147,11 +147,7 @@ impl Kalman<'_> {
                 .map(|(i, theta)| of_lane(i).map_or_else(|| alone(theta), |value| Ok(Some(value))))
                 .collect()
         };
-        let each: Vec<Vec<Option<f64>>> = thetas
-            .par_chunks(LANES)
-            .map(some)
-            .collect::<Result<_, _>>()?;
-        Ok(each.concat())
+        Ok(try_each(thetas.chunks(LANES), some)?.concat())
     }
 
     /// Returns whether lanes can hold this filter beside another: of one twin that begins at the first row, with as many rows, the same ones

@@ -15,10 +15,10 @@
 use crate::likelihood::kalman::order::Order;
 use crate::likelihood::kalman::run::spread_start;
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman};
+use crate::parallel::each;
 use crate::record::Signal;
 use crate::twin::{Acting, Composed, Entry, Now, Role};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 /// Step of a difference, as a share of what a state or a parameter varies.
 const STEP: f64 = 1e-4;
@@ -170,7 +170,7 @@ impl Kalman<'_> {
         // Rows that wait for exchanges wait together.
         let linearised: Vec<_> = match self.twin.beside() {
             1 => (0..samples).map(row).collect(),
-            _ => (0..samples).into_par_iter().map(row).collect(),
+            _ => each(0..samples, row),
         };
         let mut covariance = linear.start();
         let mut rows = Vec::with_capacity(samples);
