@@ -12,15 +12,16 @@
 
 use std::fmt::Display;
 
-/// Writes a number for a message: whole, or to eight digits; with an exponent where it is very large or small.
+/// Writes a number for a message: whole, or to eight digits; with an exponent where it is very large or small, and that is shorter.
 pub(crate) fn number(value: f64) -> String {
     let rounded = format!("{value:.7e}").parse().unwrap_or(value);
     let is_whole = value.fract() == 0.0 && value.abs() < 1e12;
     let value = if is_whole { value } else { rounded };
-    let size = value.abs();
-    match is_whole || !size.is_finite() || (1e-5..1e9).contains(&size) {
-        true => value.to_string(),
-        false => format!("{value:e}"),
+    let (plain, exponent) = (value.to_string(), format!("{value:e}"));
+    let is_usual = value == 0.0 || !value.is_finite() || (1e-5..1e9).contains(&value.abs());
+    match is_usual || is_whole && plain.len() < exponent.len() {
+        true => plain,
+        false => exponent,
     }
 }
 
@@ -131,6 +132,8 @@ mod tests {
             (0.0, "0"),
             (-2.5, "-2.5"),
             (366e5, "36600000"),
+            (2e9, "2e9"),
+            (2_147_483_648.0, "2147483648"),
             (1e308, "1e308"),
             (-5e-312, "-5e-312"),
             (f64::NAN, "NaN"),

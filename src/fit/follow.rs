@@ -226,15 +226,10 @@ pub(super) fn swallowed(
     let Some(alone) = fit(&quiet, &starts, ITERATIONS)? else {
         return Ok(None);
     };
-    let Some(first) = recoverable(quiet.first_states(&alone.theta))? else {
+    let Some(alone) = recoverable(FollowedRecords::new(&quiet, &alone.theta))? else {
         return Ok(None);
     };
-    let runs = free_runs(&quiet, &alone.theta, &first)?;
-    let Some(filtered) = recoverable(quiet.filtered(&alone.theta))? else {
-        return Ok(None);
-    };
-    let alone = errors(&quiet, &filtered, &runs);
-    let all = (fitted_errors.iter().zip(alone)).filter_map(|(own, alone)| {
+    let all = (fitted_errors.iter().zip(alone.errors)).filter_map(|(own, alone)| {
         let (with, without) = (own.free_run?, alone.free_run?);
         let is_better = without.powi(2) < (1.0 - BUDGET.swallowed) * with.powi(2);
         is_better.then(|| Swallowed {

@@ -2,7 +2,7 @@
 
 use super::parts::Theta;
 use super::{Composed, Entry, Law, TwinPart};
-use crate::math::{LANES, Lanes};
+use crate::math::{LANES, Lanes, Number};
 use crate::twin::points::{
     Layout, Points, advance_together, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes,
 };
@@ -234,9 +234,18 @@ impl Composed {
         measurement: &mut Lanes,
     ) {
         if self.parts.acts.leave_motion() && !self.parts.acts.on_noise {
-            return self.lanes_alone(now, |now| {
+            self.lanes_in_step(now, self.parts.noise_step, |now| {
                 self.own.noise_lanes(now, x, process, measurement);
             });
+            let at = |lane: usize| now.get(lane).unwrap_or(&now[0]);
+            for added in &self.parts.list {
+                if let TwinPart::Levels(levels) = &added.part {
+                    let dt = Lanes::of_lanes(|lane| added.step.unwrap_or(at(lane).dt));
+                    let theta = |entry: usize| Lanes::of_lanes(|lane| at(lane).theta[entry]);
+                    levels.set(dt, theta, process, std::slice::from_mut(measurement));
+                }
+            }
+            return;
         }
         let noise = |now: &Now<'_>, x: &[f64], q: &mut [f64], r: &mut [f64]| {
             self.noise(now, x, q, r);
@@ -255,14 +264,26 @@ impl Composed {
     /// Calls `then` with the twin's own θ in each lane; `now` has all of it.
     #[inline]
     fn lanes_alone<R>(&self, now: &[Now<'_>], then: impl FnOnce(&[Now<'_>]) -> R) -> R {
+        self.lanes_in_step(now, None, then)
+    }
+
+    /// The same with another step, where one is given.
+    #[inline]
+    fn lanes_in_step<R>(
+        &self,
+        now: &[Now<'_>],
+        step: Option<f64>,
+        then: impl FnOnce(&[Now<'_>]) -> R,
+    ) -> R {
         let own = self.parts.parameters;
-        if self.parts.entries() == own {
+        if self.parts.entries() == own && step.is_none() {
             return then(now);
         }
         let nows: [Now<'_>; LANES] = std::array::from_fn(|lane| {
-            let at = &now[if lane < now.len() { lane } else { 0 }];
+            let at = now.get(lane).unwrap_or(&now[0]);
             Now {
                 theta: &at.theta[..own],
+                dt: step.unwrap_or(at.dt),
                 ..*at
             }
         });

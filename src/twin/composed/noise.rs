@@ -1,6 +1,7 @@
 //! Noise levels and starts: of composed equations, from outside a twin, from a record.
 
 use super::{Composed, Disturbance, FittedLevels, Law, LevelSource, TwinPart};
+use crate::math::Number;
 use crate::twin::Now;
 use smallvec::SmallVec;
 
@@ -14,7 +15,7 @@ impl Composed {
                 let own_states = &mut process[..parts.states];
                 (self.own).noise(own, &x[..parts.states], own_states, measurement);
             });
-            if !parts.acts.on_noise {
+            if !(parts.acts.on_noise || parts.acts.in_levels) {
                 return;
             }
             for added in &parts.list {
@@ -44,7 +45,9 @@ impl Composed {
                             false => measurement[*target] = value,
                         }
                     }
-                    TwinPart::Levels(levels) => levels.set(now, process, measurement),
+                    TwinPart::Levels(levels) => {
+                        levels.set(now.dt, |entry| now.theta[entry], process, measurement);
+                    }
                     TwinPart::Share { output, share } => {
                         let share = share.value(now.theta);
                         if share != 0.0 {
@@ -80,28 +83,34 @@ fn join(level: &mut f64, added: f64) {
 }
 
 impl FittedLevels {
-    /// Puts fitted levels in the place of declared ones, which are those of the study's step: variances add up over time.
-    pub fn set(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        let (per_step, per_second) = ((now.dt / self.step).sqrt(), now.dt.sqrt());
+    /// Puts fitted levels in the place of declared ones, which are those of the study's step: variances add up over time. `theta` gives an entry.
+    pub fn set<N: Number>(
+        &self,
+        dt: N,
+        theta: impl Fn(usize) -> N,
+        process: &mut [N],
+        measurement: &mut [N],
+    ) {
+        let (per_step, per_second) = ((dt / N::all(self.step)).sqrt(), dt.sqrt());
         for (level, source) in process.iter_mut().zip(&self.process) {
             *level = match *source {
                 LevelSource::Declared => *level * per_step,
                 LevelSource::Fitted { entry, declared } if declared > 0.0 => {
-                    *level * per_step * (now.theta[entry] / declared)
+                    *level * per_step * (theta(entry) / N::all(declared))
                 }
-                LevelSource::Fitted { entry, .. } => now.theta[entry] * per_second,
-                LevelSource::Follows { entry, share } => now.theta[entry] * share * per_second,
+                LevelSource::Fitted { entry, .. } => theta(entry) * per_second,
+                LevelSource::Follows { entry, share } => theta(entry) * share * per_second,
             };
         }
         for (level, source) in measurement.iter_mut().zip(&self.measurement) {
-            match *source {
-                LevelSource::Declared => {}
+            *level = match *source {
+                LevelSource::Declared => *level,
                 LevelSource::Fitted { entry, declared } if declared > 0.0 => {
-                    *level *= now.theta[entry] / declared;
+                    *level * (theta(entry) / N::all(declared))
                 }
-                LevelSource::Fitted { entry, .. } => *level = now.theta[entry],
-                LevelSource::Follows { entry, share } => *level = now.theta[entry] * share,
-            }
+                LevelSource::Fitted { entry, .. } => theta(entry),
+                LevelSource::Follows { entry, share } => theta(entry) * share,
+            };
         }
     }
 }

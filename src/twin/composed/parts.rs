@@ -65,6 +65,8 @@ pub(in crate::twin) struct Acts {
     pub on_outputs: bool,
     pub on_readings: bool,
     pub on_noise: bool,
+    /// `true` where noise levels are fitted.
+    pub in_levels: bool,
     pub on_start: bool,
     /// `true` where sensors remember.
     pub in_sensors: bool,
@@ -84,9 +86,8 @@ impl Acts {
             TwinPart::Unit(_) => {
                 (self.on_outputs, self.on_noise, self.on_readings) = (true, true, true);
             }
-            TwinPart::Level { .. } | TwinPart::Levels(_) | TwinPart::Share { .. } => {
-                self.on_noise = true;
-            }
+            TwinPart::Level { .. } | TwinPart::Share { .. } => self.on_noise = true,
+            TwinPart::Levels(_) => self.in_levels = true,
             TwinPart::Start { .. } | TwinPart::UncertainStart { .. } => self.on_start = true,
             TwinPart::Disturbance(part) => {
                 (self.in_disturbances, self.on_noise, self.on_start) = (true, true, true);
@@ -129,8 +130,8 @@ impl Acts {
 
     /// Returns whether a run is one of the twin's own equations.
     pub fn leave_runs(self) -> bool {
-        let changed = self.on_outputs || self.on_readings || self.on_noise || self.on_start;
-        self.leave_motion() && !changed
+        let changed = self.on_outputs || self.on_readings || self.on_start;
+        self.leave_motion() && !(changed || self.on_noise || self.in_levels)
     }
 }
 
