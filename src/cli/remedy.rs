@@ -4,6 +4,7 @@
 
 use crate::estimator::EstimatorError;
 use crate::evaluate::EvaluateError;
+use crate::external::program::LATE;
 use crate::feature::FeatureError;
 use crate::math::MathError;
 use crate::network::NetworkError;
@@ -13,6 +14,7 @@ use crate::storage::StorageError;
 use crate::study::StudyError;
 use crate::twin::conformance::{Finding, Severity};
 use crate::twin::{SimulationError, TwinError};
+use std::fmt::Display;
 
 /// Where an error comes from.
 #[derive(Debug, Clone, Copy)]
@@ -39,11 +41,19 @@ pub(super) trait Remedy {
     }
 }
 
+/// The option for a program that is late, whatever carries its message.
+fn more_time(message: &impl Display) -> Option<String> {
+    (message.to_string().contains(LATE)).then(|| "--timeout SECONDS allows more".into())
+}
+
 impl Remedy for SimulationError {
     fn remedy(&self) -> Option<String> {
-        matches!(self, Self::Diverged { .. }).then(|| {
-            "a state, an output or a level of noise is no finite number there: other values of --theta or of an effect, [record] substeps or integrator of the study file".into()
-        })
+        if !matches!(self, Self::Diverged { .. }) {
+            return more_time(self);
+        }
+        Some(
+            "a state, an output or a level of noise is no finite number there: other values of --theta or of an effect; for equations, [record] substeps or integrator of the study file".into(),
+        )
     }
 
     fn cause(&self) -> Cause {
@@ -64,7 +74,7 @@ impl Remedy for Finding {
             ("inputs", _) => "[record] input of the study file",
             ("scale", _) if self.message.contains("prior") => "[prior] of the study file",
             ("parameters", _) if self.message.contains("fix them") => "[fixed] of the study file",
-            _ => return None,
+            _ => return more_time(&self.message),
         };
         Some(remedy.into())
     }
@@ -130,7 +140,9 @@ impl Remedy for TwinError {
             Self::UnknownIn { table, .. } | Self::Value { table, .. } => {
                 format!("[{table}] of the study file")
             }
-            Self::BlackBox(table) => format!("[{table}] of the study file"),
+            Self::BlackBox(table) => format!(
+                "[{table}] of the study file; a program shows equations in its description or serves drift (docs/external-programs.md)"
+            ),
             Self::NoPrior(name) => format!("[prior] \"{name}\" = [low, high] in the study file"),
             Self::EffectText { .. } => "each effect is a table [[effect]]".into(),
             _ => return None,
@@ -165,7 +177,7 @@ impl Remedy for StudyError {
                 number(*given)
             ),
             Self::NoFit { .. } => "[bounds] of the study file".into(),
-            _ => return None,
+            _ => return more_time(self),
         })
     }
 
@@ -193,7 +205,7 @@ impl Remedy for EstimatorError {
             Self::Search(MathError::Start(_)) => {
                 "`truetwin fit` needs no training; if the record begins elsewhere than the twin, [start] of the study file, and pretrain again".into()
             }
-            _ => return None,
+            _ => return more_time(self),
         })
     }
 
@@ -225,7 +237,7 @@ impl Remedy for EvaluateError {
             Self::Plan(error) => return error.remedy(),
             Self::Record(error) => return error.remedy(),
             Self::Parameter(error) => return error.remedy(),
-            _ => return None,
+            _ => return more_time(self),
         })
     }
 
@@ -235,5 +247,20 @@ impl Remedy for EvaluateError {
             Self::NoDeparture { .. } | Self::NoTruth { .. } | Self::Plan(_) => Cause::Study,
             _ => Cause::Call,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_late_program_is_given_the_option_for_more_time() {
+        let late = || SimulationError::fatal(format!("`x` {LATE} 2 s; flush each answer"));
+        let expected = Some("--timeout SECONDS allows more".to_owned());
+        assert_eq!(late().remedy(), expected);
+        assert_eq!(EstimatorError::Simulation(late()).remedy(), expected);
+        assert_eq!(StudyError::Simulator(late().to_string()).remedy(), expected);
+        assert_eq!(SimulationError::fatal("`x` ended").remedy(), None);
     }
 }

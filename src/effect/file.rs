@@ -3,7 +3,7 @@
 use super::catalogue::Catalogue;
 use super::check::check_given;
 use super::placed::{Effect, EffectEntry};
-use crate::storage::untrusted::{check_names, line, message, read_text};
+use crate::storage::untrusted::{all_keyed, check_names, line, message, read_text};
 use crate::twin::TwinError;
 use serde::Deserialize;
 use std::path::Path;
@@ -15,7 +15,7 @@ const LARGEST_FILE: u64 = 1 << 20;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EffectFile {
-    #[serde(default)]
+    #[serde(default, deserialize_with = "all_keyed")]
     effect: Vec<EffectEntry>,
 }
 
@@ -120,6 +120,9 @@ mod tests {
             no_table.contains("expected a table with id and target"),
             "{no_table}"
         );
+        let list = told("effect = [\n['sensor-bias', 'sensor', 'x', 'y', { offset = 3 }]]");
+        let is_told = list.contains("line 2: found a list, expected a table with id and target");
+        assert!(is_told, "{list}");
         let first = "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n";
         for (second, line, problem) in [
             ("error = 'x'", 7, "unknown key `error`"),

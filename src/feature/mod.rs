@@ -131,7 +131,7 @@ pub enum FeatureError {
     Record(#[from] RecordError),
     /// Fewer samples than the features need.
     #[error(
-        "the record has {samples} samples, these features need {needed}; lower their order or take a longer record"
+        "the record has {samples} samples, these features need {needed}; take a longer record, or features that need fewer"
     )]
     TooShort {
         /// Samples of the record.

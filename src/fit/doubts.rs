@@ -276,8 +276,14 @@ impl<'a> Doubts<'a> {
                 continue;
             }
             let what = format!("the {} noise of {}", level.role, level.name);
-            self.all
-                .push(Warning::at_bound("noise-at-bound", &what, side));
+            let mut doubt = Warning::at_bound("noise-at-bound", &what, side);
+            if level.declared.is_some() {
+                doubt.remedy = match side {
+                    Side::Low => "declare less noise, or hold it there as known",
+                    Side::High => "declare more noise, or hold it there as known",
+                };
+            }
+            self.all.push(doubt);
         }
     }
 

@@ -65,6 +65,14 @@ pub(crate) fn column_names(letter: &str, channels: usize) -> Vec<String> {
     }
 }
 
+/// The same in brackets after a space; nothing for none.
+pub(super) fn names_in_brackets(letter: &str, channels: usize) -> String {
+    match channels {
+        0 => String::new(),
+        _ => format!(" ({})", column_names(letter, channels).join(",")),
+    }
+}
+
 /// Columns of a record file with so many channels.
 pub(super) fn columns(inputs: usize, outputs: usize) -> Vec<String> {
     let time = vec!["t".to_owned()];

@@ -156,7 +156,7 @@ pub(super) enum Wanted<'a> {
     ByLetter,
 }
 
-impl Wanted<'_> {
+impl<'a> Wanted<'a> {
     /// Returns `true` if no column is given another name.
     pub fn is_usual(self) -> bool {
         match self {
@@ -165,11 +165,11 @@ impl Wanted<'_> {
         }
     }
 
-    /// Number of outputs of the twin; 0 where it is unknown.
-    pub fn outputs(self) -> usize {
+    /// Channels of the twin, where it is known.
+    pub fn signals(self) -> Option<&'a Signals> {
         match self {
-            Self::Record(_, Some(signals)) => signals.outputs.len(),
-            _ => 0,
+            Self::Record(_, signals) => signals,
+            _ => None,
         }
     }
 

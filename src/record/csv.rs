@@ -310,6 +310,26 @@ mod tests {
         assert!(message("t,y\n0,1\n").contains("1 rows"));
     }
 
+    /// Columns have the names of the file; where there are more than channels, numbers are not to blame.
+    #[test]
+    fn surplus_columns_are_named_as_the_file_has_them() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("r.csv");
+        for (header, told) in [
+            ("t,u1,u3,y", "2 inputs (u1,u3), the twin has 1 (u)"),
+            ("t,u,y1,y3", "2 outputs (y1,y3), the twin has 1 (y)"),
+            ("t,u,y,y2", "2 outputs (y,y2), the twin has 1 (y)"),
+            ("t,u2,y", "column \"u2\" is out of order"),
+        ] {
+            let width = header.split(',').count();
+            let row = |t: &str| format!("{t}{}\n", ",1".repeat(width - 1));
+            std::fs::write(&path, format!("{header}\n{}{}", row("0"), row("1"))).unwrap();
+            let mut reader = RecordReader::new(Columns::default(), Some(Signals::default()));
+            let error = reader.record(&path).unwrap_err().to_string();
+            assert!(error.contains(told), "{header}: {error}");
+        }
+    }
+
     #[test]
     fn time_must_increase() {
         for times in ["0.5", "-1"] {

@@ -1,6 +1,6 @@
 //! A measured experiment.
 
-use super::channels::{column_names, columns};
+use super::channels::{column_names, columns, names_in_brackets};
 use super::drive::{check_sizes, check_values, signal};
 use crate::math::six_digits;
 use crate::record::{Drive, Quantity, RecordError, Signal, Signals, step_of};
@@ -215,10 +215,7 @@ impl Record {
             kind,
             given,
             expected,
-            names: match expected {
-                0 => String::new(),
-                _ => format!(" ({})", column_names(letter, expected).join(",")),
-            },
+            names: names_in_brackets(letter, expected),
             twin: format!("the twin takes the columns {columns}"),
         })
     }

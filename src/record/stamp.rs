@@ -4,6 +4,8 @@ use jiff::Timestamp;
 use jiff::civil::DateTime;
 use std::borrow::Cow;
 
+/// Form of a date.
+const DATE: &str = "2024-03-31";
 /// Digits of a fraction that a nanosecond has.
 const DIGITS: usize = 9;
 
@@ -19,7 +21,7 @@ impl Stamp {
     /// a nanosecond are cut off.
     pub fn parse(text: &str) -> Option<Self> {
         // Without its signs a date is a number.
-        if text.get(4..5) != Some("-") || !has_whole_zone(text) {
+        if text.get(4..5) != Some("-") || !has_zone_of_a_clock(text) {
             return None;
         }
         let text = without_surplus_digits(text);
@@ -56,11 +58,16 @@ impl Stamp {
     }
 }
 
-/// Returns `false` for a zone without hours, such as `+:01`, which the parser takes.
-fn has_whole_zone(text: &str) -> bool {
+/// Returns `false` for a zone without hours, such as `+:01`, and for one of a day or more, which the parser takes.
+fn has_zone_of_a_clock(text: &str) -> bool {
     let sign = text.rfind(['+', '-']).map_or(text.len(), |at| at + 1);
-    // The sign before a day is followed by one, too.
-    text[sign..].bytes().take(2).all(|b| b.is_ascii_digit())
+    let digits: String = text[sign..].chars().take(2).collect();
+    let hours = digits.parse::<u8>();
+    match sign > DATE.len() {
+        true => digits.is_empty() || hours.is_ok_and(|hours| hours < 24),
+        // The sign before a day.
+        false => digits.chars().all(|c| c.is_ascii_digit()),
+    }
 }
 
 /// Cuts the fraction of a second to nanoseconds, which the parser asks for.
@@ -130,6 +137,8 @@ mod tests {
             "2024-01-01T12:00:00.",
             "2024-01-01T12:00:00+1",
             "2024-01-01T12:00:00+:01",
+            "2024-01-01T12:00:00+25:00",
+            "2024-01-01T12:00-24:00",
             "2024-01-01T12:00:00+26:00",
             "20240101",
             "2024-01-01Z",

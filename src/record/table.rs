@@ -1,6 +1,6 @@
 //! The numbers of a record file, checked cell by cell.
 
-use super::channels::{column_names, columns, is_usual};
+use super::channels::{Signals, column_names, columns, is_usual, names_in_brackets};
 use super::columns::Wanted;
 use super::drive::FileRows;
 use super::stamp::Stamp;
@@ -87,8 +87,10 @@ impl Table {
         }
         let (usual, inputs, outputs) = (wanted.usual_names(&header))
             .and_then(|usual| {
-                let names: Vec<&str> = usual.iter().flatten().map(String::as_str).collect();
-                let (inputs, outputs) = channels(&names, wanted.outputs())?;
+                let names: Vec<ColumnName<'_>> = (usual.iter().zip(&header))
+                    .filter_map(|(usual, own)| Some((usual.as_deref()?, *own)))
+                    .collect();
+                let (inputs, outputs) = channels(&names, wanted.signals())?;
                 Ok((usual, inputs, outputs))
             })
             .map_err(|problem| RecordError::Columns {
@@ -319,14 +321,19 @@ fn check_header(names: &[&str]) -> Result<(), &'static str> {
     }
 }
 
-/// Number of inputs and outputs of a header: each of t, u…, y… once and without gaps. Of a twin with so many outputs, some may be left out.
-fn channels(names: &[&str], twin: usize) -> Result<(usize, usize), String> {
+/// The usual name of a column, and its own.
+type ColumnName<'a> = (&'a str, &'a str);
+
+/// Number of inputs and outputs of a header: each of t, u…, y… once and without gaps. Of the twin's outputs, some may be left out.
+fn channels(all: &[ColumnName<'_>], signals: Option<&Signals>) -> Result<(usize, usize), String> {
+    let names: Vec<&str> = all.iter().map(|(usual, _)| *usual).collect();
+    let twin = signals.map_or(0, |signals| signals.outputs.len());
     let count = |letter: char| names.iter().filter(|n| n.starts_with(letter)).count();
     let number = |name: &&str| name.strip_prefix('y')?.parse::<usize>().ok();
     let is_of_twin = |name: &&str| number(name).is_some_and(|n| (1..=twin).contains(&n));
     let (inputs, mut outputs) = (count('u'), count('y'));
-    let mut all = names.iter().filter(|name| name.starts_with('y'));
-    if (1..twin).contains(&outputs) && all.all(is_of_twin) {
+    let mut of_outputs = names.iter().filter(|name| name.starts_with('y'));
+    if (1..twin).contains(&outputs) && of_outputs.all(is_of_twin) {
         outputs = twin;
     }
     let expected = columns(inputs, outputs);
@@ -334,7 +341,7 @@ fn channels(names: &[&str], twin: usize) -> Result<(usize, usize), String> {
     if names.iter().filter(|name| **name == "t").count() > 1 {
         return Err("column t appears twice; remove one".into());
     }
-    for name in names {
+    for (name, own) in all {
         let is_repeated = names.iter().filter(|other| *other == name).count() > 1;
         let is_expected = match *name {
             "u1" if inputs == 1 => true,
@@ -346,15 +353,39 @@ fn channels(names: &[&str], twin: usize) -> Result<(usize, usize), String> {
             name if !is_usual(name) => {
                 "is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,…, and remove others"
             }
-            _ if !is_expected => &format!("is out of order; {rename}"),
+            _ if !is_expected => match signals.and_then(|signals| too_many(all, signals)) {
+                Some(problem) => return Err(problem),
+                None => &format!("is out of order; {rename}"),
+            },
             _ => continue,
         };
-        return Err(format!("column \"{}\" {problem}", quoted(name)));
+        return Err(format!("column \"{}\" {problem}", quoted(own)));
     }
     match names.contains(&"t") {
         true => Ok((inputs, outputs)),
         false => Err("column t is missing; add the time of each row in seconds".into()),
     }
+}
+
+/// Says which channels a file has more of than the twin.
+fn too_many(all: &[ColumnName<'_>], signals: &Signals) -> Option<String> {
+    let sides = [
+        ("u", "inputs", &signals.inputs),
+        ("y", "outputs", &signals.outputs),
+    ];
+    sides.into_iter().find_map(|(letter, kind, channels)| {
+        let of_file = all.iter().filter(|(usual, _)| usual.starts_with(letter));
+        let of_file: Vec<&str> = of_file.map(|(_, own)| *own).collect();
+        let expected = channels.len();
+        (of_file.len() > expected).then(|| {
+            format!(
+                "the record has {} {kind} ({}), the twin has {expected}{}; choose the twin that this record is of, or correct the columns",
+                of_file.len(),
+                excerpt(&of_file.join(",")),
+                names_in_brackets(letter, expected)
+            )
+        })
+    })
 }
 
 /// Index of a column in a row: t first, then inputs, then outputs.

@@ -6,7 +6,7 @@ use crate::feature::FeatureRecipe;
 use crate::record::UNIFORM;
 use crate::setting::number;
 use crate::storage::files::folder;
-use crate::storage::untrusted::{check_names, line, message, read_text};
+use crate::storage::untrusted::{all_keyed, check_names, line, message, read_text};
 use crate::study::error::StudyError;
 use crate::study::noise_table::NoiseTable;
 use crate::study::plan::grid_of_files;
@@ -95,7 +95,7 @@ pub struct StudyFile {
     /// Features, in place of the preset's.
     pub(crate) features: Option<Arc<dyn FeatureRecipe>>,
     /// Effects added to the twin.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "all_keyed")]
     pub(crate) effect: Vec<EffectEntry>,
     /// Which effects a diagnosis may name.
     #[serde(skip_serializing_if = "Library::is_empty")]
@@ -199,6 +199,22 @@ impl StudyFile {
             record.hold = record.hold.or(own.hold);
         }
         file
+    }
+
+    /// Returns the file with the equations and the records of the twin's own file, if this one names the twin alone.
+    pub(super) fn upon(&self, own: &Self) -> Self {
+        let mut file = self.with_equations_of(own);
+        let (record, own) = (&mut file.record, &own.record);
+        record.step = record.step.or(own.step);
+        record.samples = record.samples.or(own.samples);
+        record.input = record.input.take().or_else(|| own.input.clone());
+        file
+    }
+
+    /// Returns whether the file sets nothing but which twin it is.
+    pub(super) fn names_twin_alone(&self) -> bool {
+        let table = toml::Table::try_from(self).unwrap_or_default();
+        self.equations.is_none() && table.keys().all(|key| key == "twin")
     }
 
     /// Returns the text of a file that is read as this one.

@@ -218,12 +218,17 @@ impl Study {
         self
     }
 
-    /// The twin, and its setting where that is a file's, as the text of a study file; `None` of compiled equations without one.
+    /// The twin and its setting as the text of a study file; `None` of compiled equations without one.
     pub fn text(&self) -> Option<String> {
-        match self.file.own_equations() {
-            Some(_) => self.file.written().ok(),
-            None => self.text.map(str::to_owned),
+        if self.file.own_equations().is_some() {
+            return self.file.written().ok();
         }
+        let text = self.text?;
+        if self.file.names_twin_alone() {
+            return Some(text.to_owned());
+        }
+        let own = StudyFile::parse(text, Path::new(self.name())).ok()?;
+        self.file.upon(&own).written().ok()
     }
 
     /// Returns the study with a plan: its own, or that of the first of these records.

@@ -278,7 +278,12 @@ pub(super) fn grid_of_files(
     let mut grid: Option<(&Path, f64, usize)> = None;
     for (input, path) in plan.files() {
         let drive = match input {
-            None => Drive::read(path)?,
+            None => Drive::read(path).map_err(|error| match error {
+                RecordError::Columns { .. } => {
+                    StudyError::Plan(format!("{error}; or give each input a file of its own"))
+                }
+                error => error.into(),
+            })?,
             // The twin, whose names tell which column it is, may not be known yet.
             Some(_) => RecordReader::default().input(path, &[])?,
         };

@@ -54,9 +54,9 @@ pub enum TwinError {
         /// Known names.
         known: String,
     },
-    /// Limits, noise levels or starts of a black box.
+    /// Limits, noise levels or starts of a black box; [`StateSpace`](crate::twin::StateSpace) shows equations.
     #[error(
-        "{0} needs the twin's equations, which a black box does not show; remove the table or implement StateSpace"
+        "{0} needs the twin's equations, which a black box does not show; remove the table or show them"
     )]
     BlackBox(&'static str),
     /// A noise level or start that the twin cannot have.

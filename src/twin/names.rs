@@ -82,9 +82,9 @@ fn check_composed(parameter: &Parameter) -> Result<(), TwinError> {
     let problem = if name.contains('@') {
         "holds an @, which stands in names of magnitudes; use _ instead"
     } else if name.starts_with("start.") && role != Role::Start {
-        "begins as an unknown start does; rename it, or give it Role::Start"
+        "begins as an unknown start does; rename it"
     } else if name.starts_with("noise.") && role != Role::Noise {
-        "begins as an unknown noise level does; rename it, or give it Role::Noise"
+        "begins as an unknown noise level does; rename it"
     } else {
         return Ok(());
     };

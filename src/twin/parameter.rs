@@ -167,7 +167,7 @@ impl Parameter {
         }
     }
 
-    /// Sets the role.
+    /// Sets the role. A black box's own parameter may be called `start.…` or `noise.…` in that role alone.
     #[must_use]
     pub fn with_role(mut self, role: Role) -> Self {
         self.role = role;

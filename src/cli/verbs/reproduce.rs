@@ -1,12 +1,14 @@
 //! `reproduce`: the paper's table and figures, on any twin.
 
 use crate::cli::prelude::*;
+use crate::estimator::bank::Prior;
 use crate::estimator::{
     Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
 };
 use crate::evaluate::paper::{
     AnswerRuns, Benchmark, BenchmarkRun, MeanRuns, MonteCarlo, Origin, Scenario, score,
 };
+use crate::network::NetworkError;
 use crate::report::{coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::storage::StorageError;
 use crate::storage::work::{Share, WorkFolder};
@@ -125,6 +127,9 @@ impl Verb for Reproduce {
             epochs: self.epochs,
             seed: context.seed,
         };
+        if given.is_none() {
+            check(&project, &training)?;
+        }
         if self.out.is_none() && !context.ranks.is_alone() {
             return Err(Failure::user("--out is required under mpirun"));
         }
@@ -199,6 +204,16 @@ fn load(
     Ok(estimator)
 }
 
+/// Refuses settings that no estimator can be trained with, before anything is written.
+fn check(project: &Project, training: &PretrainOptions) -> Result<(), EstimatorError> {
+    let recipe = project.recipe(training.preset);
+    let mut settings = recipe.settings.clone();
+    settings.bank_size = training.bank_size.unwrap_or(settings.bank_size);
+    settings.training.epochs = training.epochs.unwrap_or(settings.training.epochs);
+    settings.check()?;
+    Prior::new(project.study(), recipe.features.as_ref()).map(|_| ())
+}
+
 /// Loads the folder's estimator; trains it first if needed.
 fn kept(
     context: &Context<'_>,
@@ -216,11 +231,26 @@ fn kept(
             }
             // Another job was faster.
             Err(_) if path.exists() => {}
-            trained => drop(trained?),
+            Err(error) => {
+                // It would only stand in the way of the next call. One that is stopped may have others beside it.
+                if !is_stop(&error) && !Pretraining::work_folder(&path).exists() {
+                    MonteCarlo::remove_bare(folder);
+                }
+                return Err(error.into());
+            }
+            Ok(_) => {}
         }
     }
     context.ranks.wait();
     Ok(Estimator::load(&path, context.projects)?)
+}
+
+/// Returns whether the caller has stopped the training.
+fn is_stop(error: &EstimatorError) -> bool {
+    matches!(
+        error,
+        EstimatorError::Cancelled(_) | EstimatorError::Network(NetworkError::Cancelled(_))
+    )
 }
 
 /// Draws `first-record.svg` and, if all records share one truth, `trajectories.svg`.

@@ -82,12 +82,13 @@ impl Verb for Withheld {
             ablated: self.ablate.clone(),
             steadiness: self.steadiness,
         };
+        // What the call cannot ask for is said before anything is written.
+        let share = context.share(self.shard)?;
         let sealed = trials::Withheld::new(&study, settings)?.seal(&self.out, context.progress)?;
         if context.ranks.is_root() {
             // Printed before the first diagnosis.
             output::say(&format!("keys sealed: sha256 {}", sealed.seal()));
         }
-        let share = context.share(self.shard)?;
         let answers = sealed.answer(share, context.progress)?.len();
         if self.shard.is_some() && answers < self.trials {
             return context.print_share(&self.out, "trials", answers, self.trials);

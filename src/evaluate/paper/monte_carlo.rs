@@ -113,6 +113,11 @@ impl MonteCarlo {
         WorkFolder::open(path, &manifest, &[RUNS], |_| Ok(None))
     }
 
+    /// Removes a folder that no run is in.
+    pub(crate) fn remove_bare(folder: &WorkFolder) {
+        folder.remove_bare(RUNS);
+    }
+
     /// Everything that the runs depend on; files by their checksums.
     fn manifest(&self, study: &Study, origin: Origin<'_>) -> Result<Manifest, StorageError> {
         let manifest = study

@@ -3,7 +3,7 @@
 use super::truth::Truth;
 use crate::evaluate::EvaluateError;
 use crate::record::{Record, record_csv_text};
-use crate::storage::checksum::sha256;
+use crate::storage::checksum::{sha256, sha256_of};
 use crate::storage::reading::checksum_of_read;
 use crate::storage::untrusted::check_file;
 use crate::storage::work::{Manifest, WorkFolder};
@@ -13,7 +13,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::cell::RefCell;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 const KEYS: &str = "keys.json";
@@ -129,15 +129,37 @@ impl Folder {
 
     /// Reads a trial's record.
     pub fn record(&self, trial: usize, which: Which) -> Result<Record, EvaluateError> {
-        self.work.part(RECORDS)?;
         let name = record_name(trial, which);
-        let path = self.work.file(&name);
-        check_file(&path).map_err(|error| StorageError::io(&path, error))?;
+        let path = self.record_file(&name)?;
         let record = Record::read(&path)?;
-        let sealed = self.records.get(&name).and_then(Value::as_str);
-        match checksum_of_read(&path).as_deref() == sealed {
-            true => Ok(record),
-            false => Err(self.damaged(&name, "its SHA-256 is not that of manifest.json")),
+        self.check_sum(&name, checksum_of_read(&path).as_deref())?;
+        Ok(record)
+    }
+
+    /// Refuses a trial's record that is not the one that was sealed, without reading it into memory.
+    pub fn check_record(&self, trial: usize, which: Which) -> Result<(), EvaluateError> {
+        let name = record_name(trial, which);
+        let path = self.record_file(&name)?;
+        let sum = sha256_of(&path).map_err(|error| StorageError::io(&path, error))?;
+        self.check_sum(&name, Some(&sum))
+    }
+
+    fn record_file(&self, name: &str) -> Result<PathBuf, EvaluateError> {
+        self.work.part(RECORDS)?;
+        let path = self.work.file(name);
+        match check_file(&path) {
+            Ok(()) => Ok(path),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                Err(self.damaged(name, "it is missing"))
+            }
+            Err(error) => Err(StorageError::io(&path, error).into()),
+        }
+    }
+
+    fn check_sum(&self, name: &str, sum: Option<&str>) -> Result<(), EvaluateError> {
+        match self.records.get(name).and_then(Value::as_str) {
+            sealed @ Some(_) if sealed == sum => Ok(()),
+            _ => Err(self.damaged(name, "its SHA-256 is not that of manifest.json")),
         }
     }
 
@@ -158,6 +180,15 @@ impl Folder {
         self.list(LEFT_OUT, &text, |all: &Vec<Vec<String>>| {
             all.len() == trials
         })
+    }
+
+    /// Refuses a list of effects that libraries do without which is not that of the keys.
+    pub fn check_left_out(&self, keys: &[Truth]) -> Result<(), EvaluateError> {
+        let left_out = self.left_out(keys.len())?;
+        match left_out.iter().eq(keys.iter().map(|key| &key.effects)) {
+            true => Ok(()),
+            false => Err(self.damaged(LEFT_OUT, "its effects are not those of keys.json")),
+        }
     }
 
     fn list<T: DeserializeOwned>(

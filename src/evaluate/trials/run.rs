@@ -173,12 +173,15 @@ impl Sealed<'_> {
     ///
     /// # Errors
     ///
-    /// [`EvaluateError`]: files that cannot be read or written, keys that are not those that were sealed, a stop.
+    /// [`EvaluateError`]: files that cannot be read or written, keys or records that are not those that were sealed, a stop.
     pub fn score(&self, progress: &Progress) -> Result<Scorecard, EvaluateError> {
         let answers = self.answer(Share::WHOLE, progress)?;
         let settings = &self.trials.settings;
         // Every answer is there: now, and not before, the keys.
         let keys = self.folder.keys(settings.trials)?;
+        if settings.without {
+            self.folder.check_left_out(&keys)?;
+        }
         let sampler = &self.trials.sampler;
         let parameters: Arc<[String]> = sampler.parameters().into();
         let mut shares = self.true_shares(&keys, progress)?.into_iter();
@@ -206,6 +209,7 @@ impl Sealed<'_> {
         share: Share,
         progress: &Progress,
     ) -> Result<Vec<TrialAnswer>, EvaluateError> {
+        self.check_records(share, progress)?;
         let left_out = self.left_out()?;
         self.pieces(ANSWERS, share).all(
             &progress.stage("trials", self.trials.settings.trials),
@@ -217,6 +221,30 @@ impl Sealed<'_> {
                 })
             },
         )
+    }
+
+    /// Refuses a share whose records are not those that were sealed: those with an answer are not read again otherwise.
+    fn check_records(&self, share: Share, progress: &Progress) -> Result<(), EvaluateError> {
+        let own = &self.trials.settings;
+        let mine = (0..own.trials).filter(|trial| share.takes(*trial));
+        try_each(mine, |trial| {
+            progress.checkpoint()?;
+            self.folder.check_record(trial, Which::Own)?;
+            if own.validation {
+                self.folder.check_record(trial, Which::Validation)?;
+            }
+            if self.is_doubled(trial) {
+                self.folder.check_record(trial, Which::Doubled)?;
+            }
+            Ok::<_, EvaluateError>(())
+        })
+        .map(|_| ())
+    }
+
+    /// Returns whether a trial has a record that is twice as long: one with uneven steps has none.
+    fn is_doubled(&self, trial: usize) -> bool {
+        let own = &self.trials.settings;
+        trial < own.steadiness && (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform())
     }
 
     /// Shares that the true effects close; none where diagnoses do without effects, or without a part.
@@ -281,9 +309,8 @@ impl Sealed<'_> {
             Err(failure) => (None, Some(failure)),
         };
         let seconds = clock.elapsed().as_secs_f64();
-        let is_even = (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform());
         let is_repeated = trial < own.steadiness;
-        let doubled = (is_repeated && is_even)
+        let doubled = (self.is_doubled(trial))
             .then(|| self.folder.record(trial, Which::Doubled))
             .transpose()?;
         Ok(TrialAnswer {

@@ -105,12 +105,8 @@ impl Asker {
                 Err(Trouble::Gone(_)) if attempt < attempts => {
                     self.health.check().map_err(Unanswered::Broken)?;
                 }
-                Err(Trouble::Gone(problem)) => {
-                    let tried = match attempt {
-                        1 => String::new(),
-                        _ => format!(" (attempt {attempt})"),
-                    };
-                    return Err(Unanswered::Gone(self.named(&format!("{problem}{tried}"))));
+                Err(Trouble::Gone(copy)) => {
+                    return Err(Unanswered::Gone(self.named(&copy.text(attempt))));
                 }
             }
         }

@@ -5,7 +5,7 @@ use super::inside::{Inside, check_files};
 use super::once_each::OnceEach;
 use crate::record::{Quantity, Signals};
 use crate::setting::number;
-use crate::storage::untrusted::message;
+use crate::storage::untrusted::{Keyed, all_keyed, keyed, message};
 use crate::study::{RecordPlan, RecordTable};
 use crate::twin::{DigitalTwin, Interval, Parameter, ParameterSpace};
 use serde::Deserialize;
@@ -37,10 +37,13 @@ pub(super) struct Description {
 )]
 struct Told {
     name: String,
+    #[serde(deserialize_with = "all_keyed")]
     parameters: Vec<ToldParameter>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "all_keyed")]
     inputs: Vec<ToldQuantity>,
+    #[serde(deserialize_with = "all_keyed")]
     outputs: Vec<ToldQuantity>,
+    #[serde(deserialize_with = "keyed")]
     record: RecordTable,
 }
 
@@ -72,7 +75,7 @@ impl Description {
         {
             return Self::with_inside(Inside::parse(shown)?);
         }
-        let told: Told = serde_json::from_str(line).map_err(wrong)?;
+        let Keyed::<Told>(told) = serde_json::from_str(line).map_err(wrong)?;
         name::check(&told.name).map_err(|problem| format!("name: {problem}"))?;
         let parameters = ParameterSpace::new(told.parameters.iter().map(|p| {
             let bounds = p.bounds.unwrap_or(p.prior);
@@ -276,6 +279,35 @@ mod tests {
             let message = Description::parse(&GOOD.replace(from, to)).unwrap_err();
             assert!(message.contains(part), "{message}");
             assert!(!message.contains('\n'), "{message}");
+        }
+    }
+
+    /// Values without their keys would be read in an order that no page tells.
+    #[test]
+    fn lists_are_no_objects() {
+        let name = "expected an object with name";
+        for (from, to, part) in [
+            (
+                "{\"name\": \"k\", \"prior\": [0.5, 2]}",
+                "[\"k\", \"\", [0.5, 2], null]",
+                name,
+            ),
+            ("{\"name\": \"u\", \"unit\": \"V\"}", "[\"u\", \"V\"]", name),
+            ("{\"name\": \"y\"}", "[\"y\", \"\"]", name),
+            (
+                "{\"step\": 0.1, \"samples\": 60, \"input\": {\"levels\": [-1, 1], \"hold\": 5}}",
+                "[0.1, 60, {\"levels\": [-1, 1], \"hold\": 5}]",
+                "expected a table with step",
+            ),
+            (
+                GOOD,
+                r#"["lag", [{"name": "k", "prior": [0.5, 2]}], [], [{"name": "y"}], {"step": 0.1, "samples": 60}]"#,
+                "found a list, expected an object with name, parameters",
+            ),
+        ] {
+            assert!(GOOD.contains(from), "{from}");
+            let message = Description::parse(&GOOD.replace(from, to)).unwrap_err();
+            assert!(message.contains(part), "{message}");
         }
     }
 

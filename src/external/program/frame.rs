@@ -2,8 +2,8 @@
 
 use super::asking::Reply;
 use super::inside::ServedMethod;
-use super::protocol::check_id;
-use crate::storage::untrusted::{excerpt, message};
+use super::protocol::{check_id, error_text};
+use crate::storage::untrusted::{Keyed, message};
 use crate::twin::Now;
 use serde::Deserialize;
 
@@ -119,7 +119,7 @@ pub(super) fn reply(
     id: u64,
     (rows, points): (usize, usize),
 ) -> Result<Reply<()>, String> {
-    let told: FrameLine = serde_json::from_str(line).map_err(|error| {
+    let Keyed::<FrameLine>(told) = serde_json::from_str(line).map_err(|error| {
         let error = message(&error.to_string());
         format!("{error}; write answers alone to standard output, and all else to standard error")
     })?;
@@ -128,10 +128,10 @@ pub(super) fn reply(
     match (told.bytes, told.error) {
         (Some(bytes), None) if bytes == expected => Ok(Reply::Good((), bytes)),
         (Some(bytes), None) => Err(format!(
-            "bytes = {bytes}; {rows} rows of {points} numbers are {expected} bytes"
+            "bytes = {bytes}, {rows} rows of {points} numbers are {expected} bytes; give all of them"
         )),
-        (None, Some(text)) => Ok(Reply::Error(excerpt(&text))),
-        _ => Err("exactly one of bytes and error is needed".into()),
+        (None, Some(text)) => error_text(&text).map(Reply::Error),
+        _ => Err("exactly one of bytes and error is needed; leave the other out".into()),
     }
 }
 
@@ -211,6 +211,7 @@ mod tests {
             (r#"{"id": 4}"#, "exactly one of"),
             (r#"{"id": 4, "bytse": 80}"#, "unknown key `bytse`"),
             ("array([1.0])", "standard error"),
+            ("[4, 80, null]", "expected an object with id and bytes"),
         ] {
             let problem = reply(line, 4, (2, 5)).err().unwrap();
             assert!(problem.contains(part), "{problem}");

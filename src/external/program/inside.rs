@@ -146,6 +146,10 @@ impl Inside {
             }
             writer.table(table, &entries)?;
         }
+        let needed = ["states", "outputs"];
+        if let Some(table) = needed.iter().find(|table| !told.contains_key(**table)) {
+            return Err(format!("{table}: the twin has none; give one or more"));
+        }
         let equations = Equations::parse(&writer.text).map_err(|error| {
             let place = writer.places.get(error.line() - 1);
             let place = place.map_or("", String::as_str);
@@ -395,6 +399,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named_with_its_table() {
+        const SERVING: &str = r#"{"name": "p", "serves": "drift", "outputs": {"y": {"value": 1}}}"#;
         for (from, to, part) in [
             (
                 "\"v\", \"start\"",
@@ -431,6 +436,7 @@ mod tests {
                 "{\"serves\": \"drift\", \"name\": \"p\"",
                 "states: q has rate, and drift is served",
             ),
+            (PENDULUM, SERVING, "states: the twin has none"),
         ] {
             assert!(PENDULUM.contains(from), "{from}");
             let problem = parse(&PENDULUM.replacen(from, to, 1)).unwrap_err();

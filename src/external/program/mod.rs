@@ -44,6 +44,8 @@ pub(crate) use running::end_all;
 use served::ServedEquations;
 use std::sync::Arc;
 use std::time::Duration;
+#[cfg(feature = "cli")]
+pub(crate) use worker::LATE;
 use worker::ProgramCommand;
 
 /// Most copies of a program.

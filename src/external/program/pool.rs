@@ -3,7 +3,7 @@
 use super::super::lending::Lending;
 use super::description::Description;
 use super::protocol::{self, LONGEST_DESCRIPTION};
-use super::worker::{ProgramCommand, Trouble, Worker};
+use super::worker::{LostCopy, ProgramCommand, Trouble, Worker};
 use crate::storage::untrusted::excerpt;
 use std::time::{Duration, Instant};
 
@@ -64,9 +64,9 @@ impl Pool {
             Some(worker) => worker,
             None => {
                 let (worker, found) = introduce(&self.command, self.timeout)
-                    .map_err(|error| Trouble::Gone(format!("did not start again: {error}")))??;
+                    .map_err(|error| Trouble::Gone(LostCopy::not_started(&error)))??;
                 if found != *expected {
-                    let problem = "describes itself otherwise than when it was first started";
+                    let problem = "describes itself otherwise than when it was first started; give the same description each time";
                     return Err(Trouble::Nonsense(problem.into()));
                 }
                 worker

@@ -3,7 +3,7 @@
 use super::description::Description;
 use crate::record::{Drive, Signal, Signals};
 use crate::setting::number;
-use crate::storage::untrusted::{excerpt, message};
+use crate::storage::untrusted::{Keyed, excerpt, message};
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -145,6 +145,14 @@ pub(super) fn check_id(told: u64, id: u64) -> Result<(), String> {
     }
 }
 
+/// Returns what a program says of why it cannot go on, in one line.
+pub(super) fn error_text(told: &str) -> Result<String, String> {
+    match excerpt(told) {
+        text if text.is_empty() => Err("error is empty; say in it what is wrong".into()),
+        text => Ok(text),
+    }
+}
+
 /// Reads the answer to request `id`; the error says what is wrong with it and what to answer instead.
 pub(super) fn answer(
     line: &str,
@@ -152,7 +160,7 @@ pub(super) fn answer(
     signals: &Signals,
     drive: &Drive,
 ) -> Result<ProgramAnswer, String> {
-    let told: ToldAnswer = match serde_json::from_str(line) {
+    let Keyed::<ToldAnswer>(told) = match serde_json::from_str(line) {
         Ok(told) => told,
         Err(error) => serde_json::from_str(&finite_only(line)).map_err(|_| {
             let error = message(&error.to_string());
@@ -175,8 +183,11 @@ pub(super) fn answer(
                 ))
             }
         }
-        (None, None, Some(text)) => Ok(ProgramAnswer::Error(excerpt(&text))),
-        _ => Err("exactly one of outputs, diverged (a time in seconds) and error is needed".into()),
+        (None, None, Some(text)) => error_text(&text).map(ProgramAnswer::Error),
+        _ => Err(
+            "exactly one of outputs, diverged (a time in seconds) and error is needed; leave the others out"
+                .into(),
+        ),
     }
 }
 
@@ -192,12 +203,12 @@ fn stack(
     for (quantity, mut column) in signals.outputs.iter().zip(signal.columns_mut()) {
         let name = &quantity.name;
         let Some(values) = outputs.remove(name) else {
-            return Err(format!("outputs lack {name}"));
+            return Err(format!("outputs lack {name}; give each output"));
         };
         if values.len() != samples {
             let given = values.len();
             return Err(format!(
-                "output {name} has {given} values, {samples} samples were asked for"
+                "output {name} has {given} values, {samples} samples were asked for; give one number a sample"
             ));
         }
         for (k, (to, value)) in column.iter_mut().zip(values).enumerate() {
@@ -208,7 +219,10 @@ fn stack(
         }
     }
     if let Some(name) = outputs.keys().next() {
-        return Err(format!("{} is no output of this twin", excerpt(name)));
+        return Err(format!(
+            "{} is no output of this twin; leave it out, or describe it",
+            excerpt(name)
+        ));
     }
     Ok(match bad < samples {
         true => ProgramAnswer::Diverged(drive.time(bad)),
@@ -339,9 +353,15 @@ mod tests {
             (r#"{"id": 7}"#, "exactly one of"),
             (r#"{"id": 7, "outptus": {}}"#, "unknown key `outptus`"),
             ("[7]", "expected an object with id and outputs"),
+            (
+                r#"[7, {"y": [1, 2, 3]}, null, null]"#,
+                "expected an object with id and outputs",
+            ),
+            (r#"{"id": 7, "error": "\n"}"#, "error is empty"),
         ] {
             let message = read(line).unwrap_err();
             assert!(message.contains(part), "{message}");
+            assert!(message.contains("; "), "no remedy: {message}");
         }
     }
 }

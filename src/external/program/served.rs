@@ -137,7 +137,7 @@ impl ServedEquations {
         let at = format!("t = {} s, {}", number(t[0]), states.join(", "));
         let (method, name) = (method.name(), &of[row].name);
         self.asker.named(&format!(
-            "answered {method} with {value} for {name} at {at}"
+            "answered {method} with {value} for {name} at {at}; give finite numbers there, or shrink the bounds"
         ))
     }
 

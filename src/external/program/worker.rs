@@ -75,20 +75,57 @@ impl std::fmt::Display for ProgramCommand {
     }
 }
 
+/// What a copy that is late did; the command line knows it by these words.
+pub(crate) const LATE: &str = "gave no answer within";
+/// Remedies of what a copy did, behind the words for that.
+const IF_LATE: &str = "; flush each answer, or allow more time for one";
+const IF_ENDED: &str = "; it must answer each request until its standard input ends";
+
 /// Why a worker gave no answer.
 #[derive(Debug)]
 pub(super) enum Trouble {
     /// It ended or took too long; another copy may do.
-    Gone(String),
+    Gone(LostCopy),
     /// It said what no other copy will say better.
     Nonsense(String),
 }
 
 impl Trouble {
-    /// Returns the problem in words that follow the program's name.
+    /// Returns the problem in words that follow the program's name; whoever asks has a remedy for a copy that is gone.
     pub fn text(self) -> String {
-        let (Self::Gone(text) | Self::Nonsense(text)) = self;
-        text
+        match self {
+            Self::Gone(LostCopy { did, words, .. }) => did + &words,
+            Self::Nonsense(text) => text,
+        }
+    }
+}
+
+/// A copy that gives no answer any more.
+#[derive(Debug)]
+pub(super) struct LostCopy {
+    did: String,
+    remedy: &'static str,
+    /// The end of its standard error, as that of a message.
+    words: String,
+}
+
+impl LostCopy {
+    /// A copy that the system did not start.
+    pub fn not_started(error: &io::Error) -> Self {
+        Self {
+            did: format!("did not start again: {}", with_remedy(error)),
+            remedy: "",
+            words: String::new(),
+        }
+    }
+
+    /// Returns what the last of so many copies did, and the remedy, in words that follow the program's name.
+    pub fn text(&self, attempts: usize) -> String {
+        let Self { did, remedy, words } = self;
+        match attempts {
+            1 => format!("{did}{remedy}{words}"),
+            _ => format!("{did} (attempt {attempts}){remedy}{words}"),
+        }
     }
 }
 
@@ -162,7 +199,7 @@ impl Worker {
                 }
                 seen = 0;
                 let text = String::from_utf8(line).map_err(|_| {
-                    Trouble::Nonsense("answered with bytes that are no UTF-8".into())
+                    Trouble::Nonsense("answered with bytes that are no UTF-8; write answers alone to standard output, in UTF-8".into())
                 })?;
                 // Blank lines say nothing.
                 if text.trim().is_empty() {
@@ -194,18 +231,22 @@ impl Worker {
         match self.pieces.recv_timeout(left) {
             Ok(piece) => self.waiting.extend(piece),
             Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
-            Err(RecvTimeoutError::Timeout) => {
-                let seconds = time.as_secs_f64();
-                let text = format!("gave no answer within {seconds} s{}", self.last_words());
-                return Err(Trouble::Gone(text));
-            }
+            Err(RecvTimeoutError::Timeout) => return Err(self.late(time)),
         }
         // Blank lines without end are no answer either.
         if Instant::now() > deadline {
-            let text = format!("gave no whole answer in time{}", self.last_words());
-            return Err(Trouble::Gone(text));
+            return Err(self.late(time));
         }
         Ok(())
+    }
+
+    /// The trouble of a program that took longer than `time`.
+    fn late(&self, time: Duration) -> Trouble {
+        Trouble::Gone(LostCopy {
+            did: format!("{LATE} {} s", time.as_secs_f64()),
+            remedy: IF_LATE,
+            words: self.last_words(),
+        })
     }
 
     /// Returns whether the process still runs.
@@ -236,7 +277,11 @@ impl Worker {
         while !self.drain.is_finished() && Instant::now() < by {
             thread::sleep(Duration::from_millis(2));
         }
-        Trouble::Gone(format!("{how} without an answer{}", self.last_words()))
+        Trouble::Gone(LostCopy {
+            did: format!("{how} without an answer"),
+            remedy: IF_ENDED,
+            words: self.last_words(),
+        })
     }
 
     /// Closes the program's standard input: a hint to end.
@@ -263,7 +308,7 @@ impl Drop for Worker {
 fn too_long(longest: usize, line: &[u8]) -> Trouble {
     let start = excerpt(&String::from_utf8_lossy(&line[..line.len().min(PIECE)]));
     Trouble::Nonsense(format!(
-        "answered with a line of more than {longest} bytes: \"{start}\""
+        "answered with a line of more than {longest} bytes: \"{start}\"; write an answer a line, and errors in few words"
     ))
 }
 
@@ -326,6 +371,28 @@ pub(super) fn last_words(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_lost_copy_did_comes_with_a_remedy() {
+        let ended = || LostCopy {
+            did: "ended (exit status: 0) without an answer".into(),
+            remedy: IF_ENDED,
+            words: "; its standard error ends: no".into(),
+        };
+        assert_eq!(
+            ended().text(3),
+            "ended (exit status: 0) without an answer (attempt 3); it must answer each request until its standard input ends; its standard error ends: no"
+        );
+        assert!(!ended().text(1).contains("attempt"));
+        // Asked to describe itself, it is told what to describe.
+        let described = Trouble::Gone(ended()).text();
+        assert!(!described.contains(IF_ENDED), "{described}");
+        let long = too_long(9, b"Loading the model").text();
+        assert!(
+            long.ends_with("; write an answer a line, and errors in few words"),
+            "{long}"
+        );
+    }
 
     #[test]
     fn pieces_are_short_and_in_one_line() {

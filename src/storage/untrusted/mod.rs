@@ -3,9 +3,11 @@
 //! Files may be cut off, endless, or made to harm. Every reader takes a limit that is far beyond honest files, so that memory
 //! is bounded whatever lies under a path; and what a file says about itself is shown without what steers a terminal.
 
+mod keyed;
 mod rows;
 mod show;
 
+pub(crate) use keyed::{Keyed, all_keyed, keyed};
 pub(crate) use rows::Rows;
 pub(crate) use show::{check_names, excerpt, hidden, line, message, one_line, printable, quoted};
 

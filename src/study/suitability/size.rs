@@ -21,10 +21,15 @@ pub(super) fn check_inputs(
     let Some(planned) = planned.filter(|_| !inputs.is_empty()) else {
         return (findings, factors);
     };
+    let doses = study.twin().doses();
     for (j, input) in inputs.iter().enumerate() {
         let plan = study.plan().and_then(|plan| plan.input.as_ref());
-        let (low, high) = (plan.and_then(|plan| plan.range(&input.name)))
+        let (mut low, mut high) = (plan.and_then(|plan| plan.range(&input.name)))
             .unwrap_or_else(|| ends(&present(planned.inputs(), j).1));
+        // Most rows have no dose.
+        if doses.get(j) == Some(&true) {
+            (low, high) = (low.min(0.0), high.max(0.0));
+        }
         let (_, values) = present(record.drive().inputs(), j);
         let (least, most) = ends(&values);
         let stretch = |low: f64, high: f64| match low < high {

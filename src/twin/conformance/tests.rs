@@ -3,7 +3,8 @@
 use super::step::step_error;
 use super::*;
 use crate::record::{Quantity, Signals};
-use crate::twin::{Now, Outline, StateSpace, Twin};
+use crate::twin::fixture::OneState;
+use crate::twin::{Integrator, Now, Outline, StateSpace, Twin};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -163,4 +164,21 @@ fn an_unidentifiable_product_is_named() {
         "{}",
         finding.message
     );
+}
+
+/// A quadratic map: whoever moves θ by 1e-9 of the prior's width sees another orbit, with noise and without.
+#[test]
+fn chaos_is_no_fault_of_the_draws() {
+    let a = Parameter::new("a", "1", 1.6, 1.9).within(1.0, 2.0);
+    let map = OneState {
+        noise: [0.0, 0.01],
+        start: Some(0.0),
+        integrator: Integrator::Discrete,
+        ..OneState::new([a], |theta, _, x| 1.0 - theta[0] * x * x)
+    };
+    let drive = Drive::new(1.0, Signal::zeros((100, 1))).unwrap();
+    let found = check(&Twin::new(map), &drive, 1);
+    let paired = found.iter().find(|f| f.check == "paired").unwrap();
+    assert_eq!(paired.severity, Severity::Warning, "{}", paired.message);
+    assert!(paired.message.contains("chaotic"), "{}", paired.message);
 }

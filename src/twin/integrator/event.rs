@@ -105,6 +105,11 @@ impl Event {
         }
     }
 
+    /// Returns whether it is one at times.
+    pub(super) fn is_timed(&self) -> bool {
+        matches!(self.trigger, Trigger::Times(_))
+    }
+
     /// Returns its times; none of one of a condition.
     pub(super) fn times(&self, now: &Now<'_>) -> Vec<f64> {
         match &self.trigger {

@@ -133,10 +133,20 @@ impl EventMemory {
         let end = way.t + way.dt;
         self.before = Some((end, watches[0].truths()));
         if let Some((event, fired)) = watches.iter().find_map(EventWatch::fault) {
+            let event = &events.calls.list[event];
+            let (fault, remedy) = match event.is_timed() {
+                true => (
+                    "is too frequent",
+                    "give it fewer times, or take shorter steps",
+                ),
+                false => (
+                    "has no end",
+                    "give it a condition or a change that ends, such as a least speed",
+                ),
+            };
             self.fault = Some(format!(
-                "{} has no end: {} events in the {} s after t = {} s; give it a condition or a change that ends, such as a least speed",
-                events.calls.list[event].name(),
-                fired,
+                "{} {fault}: {fired} events in the {} s after t = {} s; {remedy}",
+                event.name(),
                 number(way.dt),
                 number(way.t)
             ));

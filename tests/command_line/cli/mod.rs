@@ -517,7 +517,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
     );
     refused(
         &["pretrain", "--study", &short, "--out", &at("h.est")],
-        &["30 samples", "lower their order"],
+        &["30 samples", "features that need fewer"],
     );
 }
 

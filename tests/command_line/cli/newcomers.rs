@@ -1,6 +1,7 @@
 //! First mistakes: each message names the place and a remedy that works, in words of the program.
 
-use super::{at, file, refused};
+use super::{at, done, file, refused};
+use std::fs;
 
 /// Words of the standard library and of other crates.
 const FOREIGN: [&str; 4] = ["invalid digit", "fit in target", "float literal", "Header"];
@@ -122,4 +123,51 @@ fn a_file_without_header_or_with_decimal_commas_says_so() {
         &["fit", &commas, "--twin", "tanks"],
         &["commas.csv", "by semicolons"],
     );
+}
+
+/// A study that names a reference twin is exported with its settings: what it simulates stays the same.
+#[test]
+fn an_export_has_the_settings_of_its_study() {
+    let place = tempfile::tempdir().unwrap();
+    let inside = |name: &str| place.path().join(name).display().to_string();
+    let study = "twin = 'van-der-pol'\n[record]\nsamples = 50\nsubsteps = 3\nintegrator = 'runge-kutta-4'\n\
+                 [noise]\ny = 0.01\n[fixed]\nnu = 1.2\n[[effect]]\nid = 'sensor-bias'\ntarget = 'sensor'\n";
+    fs::write(inside("s.toml"), study).unwrap();
+    let text = done(&["export", "--study", &inside("s.toml")]);
+    fs::write(inside("e.toml"), &text).unwrap();
+    let simulated = |study: &str| {
+        let theta = "sensor-bias@sensor.offset=0.1";
+        let out = inside(&format!("{study}.csv"));
+        done(&[
+            "simulate",
+            "--study",
+            &inside(study),
+            "--theta",
+            theta,
+            "--out",
+            &out,
+        ]);
+        fs::read_to_string(out).unwrap()
+    };
+    assert_eq!(simulated("e.toml"), simulated("s.toml"), "{text}");
+    // Without settings, the text is the one with its comments.
+    let bare = done(&["export", "--twin", "van-der-pol"]);
+    assert!(bare.contains('#'), "{bare}");
+}
+
+/// Rows between doses are no inputs outside the study's range.
+#[test]
+fn records_of_doses_pass() {
+    let place = tempfile::tempdir().unwrap();
+    let record = place.path().join("pk.csv").display().to_string();
+    let study = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/examples/pharmacokinetics.toml"
+    );
+    let theta = "ka=1,CL=5,V=20,Q=3";
+    done(&[
+        "simulate", "--study", study, "--theta", theta, "--out", &record,
+    ]);
+    let text = done(&["check", &record, "--study", study]);
+    assert!(!text.contains("outside"), "{text}");
 }

@@ -3,6 +3,7 @@
 use super::{at, done, file, json, refused};
 use serde_json::Value;
 use std::fs;
+use std::path::Path;
 
 /// The oscillator, paper preset, small enough for a test.
 const SMALL: [&str; 11] = [
@@ -159,6 +160,34 @@ fn a_folder_goes_on_where_it_stopped() {
         7,
         "a refusal leaves nothing behind"
     );
+}
+
+/// A wrong number leaves no folder behind, which would refuse the corrected call.
+#[test]
+fn wrong_settings_are_refused_before_anything_is_written() {
+    let out = at("unwritten");
+    let fixed = file(
+        "all-fixed.toml",
+        "twin = 'van-der-pol'\n[fixed]\nnu = 1.0\n",
+    );
+    let garbage = file("garbage.est", "no estimator");
+    let call = ["reproduce", "--runs", "1", "--out", &out];
+    for (more, part) in [
+        (["--bank-size", "0"], "bank size = 0;"),
+        (["--bank-size", "99"], "bank size = 99;"),
+        (["--bank-size", "20000000"], "fit into memory"),
+        (["--epochs", "0"], "epochs = 0"),
+        (["--threads", "0"], "--threads"),
+        (["--shard", "3/2"], "3/2"),
+        (["--estimator", &garbage], "garbage.est"),
+    ] {
+        let call = [&call[..], &["--twin", "van-der-pol"], &more[..]].concat();
+        refused(&call, &[part]);
+        assert!(!Path::new(&out).exists(), "{more:?}");
+    }
+    let call = [&call[..], &["--scenario", "0", "--study", &fixed]].concat();
+    refused(&call, &["all parameters are fixed"]);
+    assert!(!Path::new(&out).exists());
 }
 
 #[test]

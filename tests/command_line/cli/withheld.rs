@@ -135,5 +135,6 @@ fn trials_can_be_like_a_measured_record() {
             "van-der-pol takes the columns t,y",
         ],
     );
+    assert!(!Path::new(&format!("{out}-2")).exists());
     fs::remove_dir_all(place).unwrap();
 }

@@ -88,6 +88,40 @@ fn trials_are_gone_on_with_and_keys_stay_as_they_were_sealed() {
     );
 }
 
+/// Sealed records stay what they were, though their trials are answered: a share looks at its own, a score at all.
+#[test]
+fn records_of_answered_trials_are_refused_where_they_are_altered_or_gone() {
+    let study = oscillator();
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("trials");
+    let settings = || TrialSettings {
+        validation: true,
+        ..two()
+    };
+    let silent = Progress::silent();
+    let score = || sealed(&study, settings(), &path)?.score(&silent);
+    let first = score().unwrap();
+    let refused = |name: &str, reason: &str| {
+        let error = score().unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains(reason), "{error}");
+        let sealed = sealed(&study, settings(), &path).unwrap();
+        let answered = |share: &str| sealed.answer(share.parse().unwrap(), &silent);
+        let error = answered("1/2").unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains(reason), "{error}");
+        assert_eq!(answered("2/2").unwrap().len(), 2);
+    };
+    for name in ["records/0001.csv", "records/0001-validation.csv"] {
+        let record = path.join(name);
+        let text = fs::read(&record).unwrap();
+        fs::write(&record, [&text[..], b"\n"].concat()).unwrap();
+        refused(name, "its SHA-256 is not that of manifest.json");
+        fs::remove_file(&record).unwrap();
+        refused(name, "it is missing");
+        fs::write(&record, text).unwrap();
+    }
+    assert_eq!(score().unwrap(), first);
+}
+
 #[test]
 fn shares_answer_apart_and_are_scored_together() {
     let study = oscillator();
@@ -146,6 +180,15 @@ fn what_a_library_leaves_out_is_known_before_the_keys_are() {
         assert_eq!(left_out, &key.effects);
     }
     assert!(left_out.iter().any(Vec::is_empty) && !left_out.iter().all(Vec::is_empty));
+    sealed.folder.check_left_out(&keys).unwrap();
+    sealed
+        .write("left-out.json", "[[], [], [], [], []]")
+        .unwrap();
+    let error = sealed.folder.check_left_out(&keys).unwrap_err().to_string();
+    assert!(
+        error.contains("left-out.json") && error.contains("keys.json"),
+        "{error}"
+    );
 }
 
 #[test]
