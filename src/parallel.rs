@@ -9,20 +9,20 @@ pub(crate) fn each<I: Send, R: Send>(
     items: impl IntoIterator<Item = I>,
     work: impl Fn(I) -> R + Sync,
 ) -> Vec<R> {
-    let places: Vec<Mutex<Place<I, R>>> = (items.into_iter())
-        .map(|item| Mutex::new(Place::Waiting(item)))
+    let slots: Vec<Mutex<WorkSlot<I, R>>> = (items.into_iter())
+        .map(|item| Mutex::new(WorkSlot::Waiting(item)))
         .collect();
-    spread(places.len(), &|i| {
-        let waiting = std::mem::replace(&mut *locked(&places[i]), Place::Begun);
-        if let Place::Waiting(item) = waiting {
+    spread(slots.len(), &|i| {
+        let waiting = std::mem::replace(&mut *locked(&slots[i]), WorkSlot::Begun);
+        if let WorkSlot::Waiting(item) = waiting {
             let done = work(item);
-            *locked(&places[i]) = Place::Done(done);
+            *locked(&slots[i]) = WorkSlot::Done(done);
         }
     });
-    (places.into_iter())
-        .map(|place| place.into_inner().unwrap_or_else(PoisonError::into_inner))
-        .filter_map(|place| match place {
-            Place::Done(result) => Some(result),
+    (slots.into_iter())
+        .map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner))
+        .filter_map(|slot| match slot {
+            WorkSlot::Done(result) => Some(result),
             _ => None,
         })
         .collect()
@@ -51,14 +51,14 @@ pub(crate) fn try_each<I: Send, T: Send, E: Send>(
     all.into_iter().flatten().collect()
 }
 
-enum Place<I, R> {
+enum WorkSlot<I, R> {
     Waiting(I),
     Begun,
     Done(R),
 }
 
-fn locked<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
-    place.lock().unwrap_or_else(PoisonError::into_inner)
+fn locked<T>(slot: &Mutex<T>) -> MutexGuard<'_, T> {
+    slot.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn spread(count: usize, work: &(dyn Fn(usize) + Sync)) {

@@ -3,14 +3,14 @@
 use super::declared::{Declared, NoiseValue, StartValue};
 use super::entries::{TableEntry, entries};
 use super::error::EquationsError;
-use super::event::{EVENT, EventText, events};
+use super::event::{EventText, events};
 use super::graph::{Graph, Id, Varies};
 use super::names::{Meaning, Scope};
 use super::place::{SourceText, number};
 use super::program::{Program, Tapes};
 use super::tape::OperationTape;
 use super::twin::Equations;
-use super::written::written;
+use super::written::{TABLES, written};
 use crate::record::Quantity;
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, message};
@@ -23,17 +23,6 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Tables of a twin, in the order in which they are written.
-pub(crate) const TABLES: [&str; 8] = [
-    "twin",
-    "parameters",
-    "constants",
-    "define",
-    "states",
-    "inputs",
-    "outputs",
-    EVENT,
-];
 /// Table of records, of which the integrator is read here.
 const RECORD: &str = "record";
 /// Name of a twin that has none.

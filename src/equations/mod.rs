@@ -50,6 +50,7 @@ mod written;
 
 pub(crate) use declared::Declared;
 pub use error::EquationsError;
-pub(crate) use file::{TABLES, take};
+pub(crate) use file::take;
 pub(crate) use program::Program;
 pub use twin::Equations;
+pub(crate) use written::TABLES;

@@ -91,11 +91,11 @@ pub(super) fn number(value: &DeValue<'_>) -> Option<f64> {
 }
 
 /// A key of a table, and its value.
-pub(super) type Keyed<'a, 't> = (&'a Spanned<DeString<'t>>, &'a Spanned<DeValue<'t>>);
+pub(super) type KeyedValue<'a, 't> = (&'a Spanned<DeString<'t>>, &'a Spanned<DeValue<'t>>);
 
 /// Returns the entries of a table in the order of the file.
-pub(super) fn in_order<'a, 't>(table: &'a DeTable<'t>) -> Vec<Keyed<'a, 't>> {
-    let mut all: Vec<Keyed<'a, 't>> = table.iter().collect();
+pub(super) fn in_order<'a, 't>(table: &'a DeTable<'t>) -> Vec<KeyedValue<'a, 't>> {
+    let mut all: Vec<KeyedValue<'a, 't>> = table.iter().collect();
     all.sort_by_key(|(key, _)| key.span().start);
     all
 }

@@ -1,9 +1,20 @@
 //! The tables of a twin, written from what a file has.
 
-use super::file::TABLES;
+use super::event::EVENT;
 use super::place::{in_order, number};
 use toml::de::{DeTable, DeValue};
 
+/// Tables of a twin, in the order in which they are written.
+pub(crate) const TABLES: [&str; 8] = [
+    "twin",
+    "parameters",
+    "constants",
+    "define",
+    "states",
+    "inputs",
+    "outputs",
+    EVENT,
+];
 /// Returns the tables of a twin as a file has them, without comments.
 pub(super) fn written(file: &DeTable<'_>) -> String {
     let mut text = String::new();

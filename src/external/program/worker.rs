@@ -75,7 +75,7 @@ impl std::fmt::Display for ProgramCommand {
     }
 }
 
-/// What a copy that is late did; the command line knows it by these words.
+/// Words for a copy that is late, by which the command line knows it.
 pub(crate) const LATE: &str = "gave no answer within";
 /// Remedies of what a copy did, behind the words for that.
 const IF_LATE: &str = "; flush each answer, or allow more time for one";

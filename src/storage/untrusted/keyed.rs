@@ -53,7 +53,7 @@ impl<'de, D: Deserializer<'de>> Deserializer<'de> for NoList<D> {
     }
 }
 
-/// What a visitor makes of keys and their values.
+/// A visitor of keys and their values alone.
 struct KeysOnly<V>(V);
 
 impl<'de, V: Visitor<'de>> Visitor<'de> for KeysOnly<V> {
