@@ -93,3 +93,36 @@ pub(super) fn restarted(
     }
     Ok(false)
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::record::{Drive, Record, Signal};
+    use crate::study::Study;
+    use crate::twin::fixture::OneState;
+    use crate::twin::{Integrator, Parameter, Twin};
+
+    /// The level of noise ends where no filter tells a smaller one: at a bound, not on a slope.
+    #[test]
+    fn searches_arrive_at_records_without_noise() {
+        let truth = [2.0, 3.0];
+        for declared in [1e-2, 1e-4, 1e-7] {
+            let gain = Parameter::new("K", "K/W", 0.5, 4.0);
+            let tau = Parameter::new("tau", "s", 1.0, 8.0);
+            let room = OneState {
+                noise: [0.0, declared],
+                start: Some(0.0),
+                integrator: Integrator::RungeKutta4,
+                ..OneState::new([gain, tau], |theta, u, x| (theta[0] * u[0] - x) / theta[1])
+            };
+            let inputs = Signal::from_shape_fn((100, 1), |(k, _)| (k / 9 % 3) as f64);
+            let drive = Drive::new(0.5, inputs).unwrap();
+            let run = Twin::new(room.clone()).free_run(&truth, &drive).unwrap();
+            let record = Record::new(drive, run).unwrap();
+            let fit = Study::of(room).unwrap().fit(&[record]).unwrap();
+            assert!(fit.convergence.converged, "{:?}", fit.convergence);
+            for (parameter, truth) in fit.parameters.iter().zip(truth) {
+                assert!((parameter.value - truth).abs() < 1e-5, "{parameter:?}");
+            }
+        }
+    }
+}

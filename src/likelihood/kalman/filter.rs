@@ -85,9 +85,7 @@ impl<'a> Kalman<'a> {
             outputs: outline.outputs,
         })?;
         let limits = twin.limits().to_vec();
-        let floor: Vec<f64> = (record.outputs().columns().into_iter())
-            .map(|y| settings.noise_floor * scale(y.iter().copied().filter(|v| !v.is_nan())))
-            .collect();
+        let floor = settings.floors(&record);
         Ok(Self {
             twin,
             record,
@@ -141,17 +139,6 @@ impl<'a> Kalman<'a> {
         clip(&mut state.mean, &mut state.cov, &self.limits, &mut scale);
         state
     }
-}
-
-/// Variance of an output; of a constant one, its mean square; of zeros, one.
-fn scale(y: impl Iterator<Item = f64> + Clone) -> f64 {
-    let n = y.clone().count() as f64;
-    let mean = y.clone().sum::<f64>() / n;
-    let variance = y.map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    [variance, mean * mean, 1.0]
-        .into_iter()
-        .find(|v| *v > 0.0)
-        .unwrap_or(1.0)
 }
 
 #[cfg(test)]

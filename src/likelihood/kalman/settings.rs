@@ -1,6 +1,7 @@
 //! Which filter, and its few numbers.
 
 use super::FilterError;
+use crate::record::Record;
 use crate::setting::SettingError;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -51,6 +52,13 @@ impl Default for FilterSettings {
 }
 
 impl FilterSettings {
+    /// Least variance of the measurement noise of each output of a record.
+    pub(in crate::likelihood) fn floors(&self, record: &Record) -> Vec<f64> {
+        (record.outputs().columns().into_iter())
+            .map(|y| self.noise_floor * scale(y.iter().copied().filter(|v| !v.is_nan())))
+            .collect()
+    }
+
     /// With another method.
     #[must_use]
     pub fn with_method(mut self, method: Method) -> Self {
@@ -86,6 +94,17 @@ impl FilterSettings {
         }
         Ok(())
     }
+}
+
+/// Variance of an output; of a constant one, its mean square; of zeros, one.
+fn scale(y: impl Iterator<Item = f64> + Clone) -> f64 {
+    let n = y.clone().count() as f64;
+    let mean = y.clone().sum::<f64>() / n;
+    let variance = y.map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    [variance, mean * mean, 1.0]
+        .into_iter()
+        .find(|v| *v > 0.0)
+        .unwrap_or(1.0)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Fitted noise levels: what is declared, or guessed from the records.
 
 use crate::effect::stops;
+use crate::likelihood::kalman::FilterSettings;
 use crate::record::{Quantity, Record};
 use crate::twin::{
     Composed, FittedLevels, Interval, LevelSource, LevelValue, Outline, Parameter, Role, Twin,
@@ -260,6 +261,15 @@ fn guesses<'a>(
         };
         (!is_memory(&state.name) && is_fitted(&state.name)).then(guess)
     };
+    let settings = FilterSettings::default();
+    let all: Vec<Vec<f64>> = records.iter().map(|r| settings.floors(r)).collect();
+    // Below it, filters take all levels for the same. A record without values of an output says nothing of it.
+    let floor = |j: usize| {
+        let of_records = (records.iter().zip(&all))
+            .filter(|(record, _)| record.outputs().column(j).iter().any(|y| y.is_finite()))
+            .map(|(_, floors)| floors[j].sqrt());
+        of_records.reduce(f64::min).unwrap_or(f64::MIN_POSITIVE)
+    };
     let of_output = |j: usize| {
         let (output, size) = (&outline.outputs[j], sizes.outputs[j]);
         let has_end = |record: &Record| stops(&record.outputs().column(j).to_vec());
@@ -268,7 +278,7 @@ fn guesses<'a>(
             unit: output.unit.clone(),
             floor: match records.iter().any(has_end) {
                 true => MEASURED.stopped * size,
-                false => f64::MIN_POSITIVE,
+                false => floor(j).max(f64::MIN_POSITIVE),
             },
             declared: sizes.declared.measurement[j],
             guessed: MEASURED.share * size,
