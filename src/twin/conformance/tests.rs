@@ -169,7 +169,7 @@ fn an_unidentifiable_product_is_named() {
 /// A quadratic map: whoever moves θ by 1e-9 of the prior's width sees another orbit, with noise and without.
 #[test]
 fn chaos_is_no_fault_of_the_draws() {
-    let a = Parameter::new("a", "1", 1.6, 1.9).within(1.0, 2.0);
+    let a = Parameter::new("a", "1", 1.55, 1.73).within(1.0, 2.0);
     let map = OneState {
         noise: [0.0, 0.01],
         start: Some(0.0),

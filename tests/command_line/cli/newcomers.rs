@@ -54,7 +54,7 @@ fn a_number_is_asked_for_in_plain_words() {
     told(&["twins", "--seed", ""], &["--seed", whole]);
     told(
         &["twins", "--seed", "18446744073709551616"],
-        &["up to 18446744073709551615"],
+        &["a smaller whole number"],
     );
     told(
         &[
