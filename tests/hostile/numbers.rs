@@ -188,21 +188,29 @@ fn outputs_of_such_a_size_ask_for_another_unit() {
     }
 }
 
-/// A record in another unit, so that all that is fitted ends at a bound: nothing is left to draw, and the fit says so by its values.
+/// A record in another unit, far beyond all that the bounds allow: the fit ends, says what lies at a bound, and stays within them.
 #[test]
 fn a_record_beyond_all_bounds_is_fitted_at_them() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
     let study = "[parameters]\na = { prior = [0.5, 2], bounds = [0.1, 5] }\n[states]\nx = { rate = 'a - x', start = 0 }\n[outputs]\ny = { value = 'x', noise = 0.05 }\n[record]\nstep = 0.2\nsamples = 30\n";
     fs::write(at.join("s.toml"), study).unwrap();
-    let rows = (0..30).map(|k| {
-        let spread = (7 * k) % 11;
-        format!("{},{}e5\n", 0.2 * f64::from(k), 30 + spread)
-    });
-    let record = "t,y\n".to_owned() + &rows.collect::<String>();
-    fs::write(at.join("r.csv"), record).unwrap();
-    let output = run(at, &["fit", "r.csv", "--study", "s.toml", "--json"]);
-    assert!(output.status.success(), "{}", told(&output));
-    let fit: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(fit["parameters"]["a"]["value"], 5.0, "{fit}");
+    for spread in [0, 1] {
+        let rows = (0..30).map(|k| {
+            let off = spread * ((7 * k) % 11);
+            format!("{},{}e5\n", 0.2 * f64::from(k), 30 + off)
+        });
+        let record = "t,y\n".to_owned() + &rows.collect::<String>();
+        fs::write(at.join("r.csv"), record).unwrap();
+        let output = run(at, &["fit", "r.csv", "--study", "s.toml", "--json"]);
+        assert!(output.status.success(), "{}", told(&output));
+        let fit: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let value = fit["parameters"][0]["value"].as_f64().unwrap();
+        assert!((0.1..=5.0).contains(&value), "{fit}");
+        let warnings = fit["warnings"].as_array().unwrap();
+        assert!(
+            warnings.iter().any(|w| w["code"] == "noise-at-bound"),
+            "{fit}"
+        );
+    }
 }

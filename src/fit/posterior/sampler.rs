@@ -350,6 +350,15 @@ mod tests {
     use super::*;
     use crate::twin::Noise;
 
+    /// Where all entries lie at bounds, there is nothing to draw.
+    #[test]
+    fn nothing_is_proposed_where_nothing_may_move() {
+        let centre = DVector::from_vec(vec![1.0, 2.0]);
+        let one = Proposal::new(vec![1], centre.clone(), DMatrix::identity(1, 1)).unwrap();
+        assert!(one.within(&[], &centre).is_none());
+        assert!(one.within(&[1], &centre).is_some());
+    }
+
     /// Draws are taken as often as their weights say, and nothing is made of a single heavy one.
     #[test]
     fn weights_are_frequencies() {
