@@ -129,6 +129,11 @@ impl Stage {
         self.progress.checkpoint()
     }
 
+    /// Fails where the listener asks to stop.
+    pub fn checkpoint(&self) -> Result<(), Cancelled> {
+        self.progress.checkpoint()
+    }
+
     /// So many units were done before, by work that this goes on with.
     pub fn skip(&self, done: usize) {
         let done = self.done.fetch_add(done as u64, Ordering::Relaxed) + done as u64;

@@ -179,7 +179,7 @@ impl FeatureSimulator {
     ) -> Result<Draws, EstimatorError> {
         let numbers: Vec<u64> = rows.collect();
         let chunks = try_each(numbers.chunks(self.at_once()), |numbers| {
-            let rows = self.chunk(numbers, &noise, &draw)?;
+            let rows = self.chunk(numbers, &noise, &draw, stage)?;
             numbers.iter().try_for_each(|_| stage.tick())?;
             Ok::<_, EstimatorError>(rows)
         })?;
@@ -209,9 +209,11 @@ impl FeatureSimulator {
         numbers: &[u64],
         noise: &impl Fn(u64) -> Noise,
         draw: &impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, EstimatorError>,
+        stage: &Stage,
     ) -> Result<Vec<DrawnRow>, EstimatorError> {
         let mut rows: Vec<DrawnRow> = numbers.iter().map(|_| DrawnRow::default()).collect();
         while rows.iter().any(|row| row.drawn.is_none()) {
+            stage.checkpoint()?;
             let mut places: Vec<(&mut DrawnRow, Draw<'a>, Noise)> = vec![];
             let missing = rows.iter_mut().zip(numbers);
             for (row, &number) in missing.filter(|(row, _)| row.drawn.is_none()) {

@@ -85,7 +85,7 @@ impl<'a> Kalman<'a> {
             outputs: outline.outputs,
         })?;
         let limits = twin.limits().to_vec();
-        let floor = settings.floors(&record);
+        let floor = settings.floors(record);
         Ok(Self {
             twin,
             record,

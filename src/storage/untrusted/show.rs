@@ -73,7 +73,20 @@ pub(crate) fn quoted(text: &str) -> String {
 /// The message of a parser in one line, without the words of the language that this program is written in.
 pub(crate) fn message(text: &str) -> String {
     let replace = |text: String, (theirs, ours): &(&str, &str)| text.replace(theirs, ours);
-    one_line(&WORDS.iter().fold(short_numbers(text), replace), MESSAGE)
+    let text = WORDS.iter().fold(short_numbers(text), replace);
+    one_line(&short_quotes(&text), MESSAGE)
+}
+
+/// Quotes that are too long, by their beginnings: what stands behind them is not to be cut off.
+fn short_quotes(text: &str) -> String {
+    let parts = text.split('`').enumerate().map(|(i, part)| {
+        let is_long = i % 2 == 1 && part.chars().count() > QUOTED;
+        match is_long {
+            true => Cow::Owned(excerpt(part)),
+            false => Cow::Borrowed(part),
+        }
+    });
+    parts.collect::<Vec<_>>().join("`")
 }
 
 /// Numbers of more digits than a message needs, to six of them: a parser writes all that a number has.
@@ -179,6 +192,12 @@ mod tests {
         assert_eq!(message(&long), "found `1e308`, 1e-301 in a_123456789");
         assert_eq!(message("536870912 of 0.25"), "536870912 of 0.25");
         assert_eq!(quoted("t\u{feff}1\u{a0}0"), "t\\u{feff}1\\u{a0}0");
+        let key = message(&format!(
+            "unknown field `{}`, expected `a`",
+            "[".repeat(5000)
+        ));
+        assert!(key.ends_with(" …`, expected `a`"), "{key}");
+        assert!(key.chars().count() < 2 * QUOTED, "{key}");
     }
 
     #[test]
