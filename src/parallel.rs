@@ -51,6 +51,18 @@ pub(crate) fn try_each<I: Send, T: Send, E: Send>(
     all.into_iter().flatten().collect()
 }
 
+/// `work` that may fail or find nothing on each item; returns what is found.
+///
+/// # Errors
+///
+/// As those of [`try_each`].
+pub(crate) fn try_found<I: Send, T: Send, E: Send>(
+    items: impl IntoIterator<Item = I>,
+    work: impl Fn(I) -> Result<Option<T>, E> + Sync,
+) -> Result<Vec<T>, E> {
+    Ok(try_each(items, work)?.into_iter().flatten().collect())
+}
+
 enum WorkSlot<I, R> {
     Waiting(I),
     Begun,

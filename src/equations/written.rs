@@ -15,6 +15,7 @@ pub(crate) const TABLES: [&str; 8] = [
     "outputs",
     EVENT,
 ];
+
 /// Returns the tables of a twin as a file has them, without comments.
 pub(super) fn written(file: &DeTable<'_>) -> String {
     let mut text = String::new();

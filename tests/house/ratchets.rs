@@ -280,7 +280,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 163, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 62_616, lines),
+        Ratchet::new("lines of code", 62_614, lines),
         Ratchet::new("files", 495, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),

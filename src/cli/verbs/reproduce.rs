@@ -1,7 +1,6 @@
 //! `reproduce`: the paper's table and figures, on any twin.
 
 use crate::cli::prelude::*;
-use crate::estimator::bank::Prior;
 use crate::estimator::{
     Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
 };
@@ -128,7 +127,8 @@ impl Verb for Reproduce {
             seed: context.seed,
         };
         if given.is_none() {
-            check(&project, &training)?;
+            // Before anything is written.
+            Pretraining::new(&project, training).check()?;
         }
         if self.out.is_none() && !context.ranks.is_alone() {
             return Err(Failure::user("--out is required under mpirun"));
@@ -202,16 +202,6 @@ fn load(
         }
     }
     Ok(estimator)
-}
-
-/// Refuses settings that no estimator can be trained with, before anything is written.
-fn check(project: &Project, training: &PretrainOptions) -> Result<(), EstimatorError> {
-    let recipe = project.recipe(training.preset);
-    let mut settings = recipe.settings.clone();
-    settings.bank_size = training.bank_size.unwrap_or(settings.bank_size);
-    settings.training.epochs = training.epochs.unwrap_or(settings.training.epochs);
-    settings.check()?;
-    Prior::new(project.study(), recipe.features.as_ref()).map(|_| ())
 }
 
 /// Loads the folder's estimator; trains it first if needed.

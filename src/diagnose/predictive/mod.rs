@@ -29,7 +29,7 @@ use crate::fit::posterior::PosteriorSample;
 use crate::fit::problem::Problem;
 use crate::hypothesis::search::model::Model;
 use crate::math::{deviation, quantile};
-use crate::parallel::try_each;
+use crate::parallel::try_found;
 use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::Noise;
@@ -113,8 +113,7 @@ impl Predictive<'_> {
         numbers: Range<usize>,
         theta: impl Fn(usize) -> &'t Vec<f64> + Sync,
     ) -> Result<Vec<Replicate>, StudyError> {
-        let all = try_each(numbers, |i| self.replicate(i, theta(i).clone()))?;
-        Ok(all.into_iter().flatten().collect())
+        try_found(numbers, |i| self.replicate(i, theta(i).clone()))
     }
 
     fn replicate(&self, i: usize, theta: Vec<f64>) -> Result<Option<Replicate>, StudyError> {
@@ -190,8 +189,7 @@ fn looks(
     replicates: &[Replicate],
     statistics: &[Discrepancy],
 ) -> Result<Vec<Look>, StudyError> {
-    let looks = try_each(replicates, |one| {
+    try_found(replicates, |one| {
         statistics::look(problem, &one.records, &one.theta, statistics)
-    })?;
-    Ok(looks.into_iter().flatten().collect())
+    })
 }

@@ -4,7 +4,7 @@ use super::{Draw, Draws};
 use crate::estimator::budget::BUDGET;
 use crate::estimator::error::EstimatorError;
 use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
-use crate::parallel::{each, try_each};
+use crate::parallel::try_each;
 use crate::progress::Stage;
 use crate::record::{Drive, Record, Signal, check_sizes};
 use crate::twin::{Noise, Twin};
@@ -137,16 +137,17 @@ impl FeatureSimulator {
         seeds: usize,
     ) -> Result<DVector<f64>, EstimatorError> {
         let samples: Vec<u64> = (0..seeds as u64).collect();
-        let runs = each(samples.chunks(self.at_once()), |samples| {
+        let runs = try_each(samples.chunks(self.at_once()), |samples| {
             let all: Vec<_> = (samples.iter())
                 .map(|&sample| (theta, drive, noise(sample)))
                 .collect();
-            self.features(&all)
-        });
+            let features = self.features(&all).into_iter();
+            features.collect::<Result<Vec<_>, EstimatorError>>()
+        })?;
         // Summed in order: the same bits for any number of threads.
         let mut mean = DVector::zeros(self.dim());
         for run in runs.into_iter().flatten() {
-            mean += DVector::from_vec(run?);
+            mean += DVector::from_vec(run);
         }
         Ok(mean / seeds as f64)
     }

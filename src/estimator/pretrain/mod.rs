@@ -231,6 +231,15 @@ impl Pretraining {
         }
     }
 
+    /// Refuses settings that no estimator can be trained with; nothing is written.
+    pub(crate) fn check(&self) -> Result<(), EstimatorError> {
+        let plan = PretrainPlan::new(&self.project, self.sized())?;
+        match self.bank {
+            Some(_) => Ok(()),
+            None => plan.size_in_memory().map(|_| ()),
+        }
+    }
+
     /// Returns where the work on the estimator at `path` is kept.
     pub fn work_folder(path: &Path) -> PathBuf {
         let mut name = path.as_os_str().to_owned();

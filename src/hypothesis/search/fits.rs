@@ -9,7 +9,7 @@ use crate::fit::spectral_starts;
 use crate::fit::starts::{Care, search};
 use crate::hypothesis::limits::SEARCH;
 use crate::likelihood::kalman::FilterError;
-use crate::parallel::try_each;
+use crate::parallel::try_found;
 use crate::twin::Noise;
 
 /// Shares of the step to the top of the quadratic that a function's fit may begin at.
@@ -119,7 +119,7 @@ pub(crate) fn anneal(
     let c = &held.problem.coordinates;
     let quiet = (model.problem.coordinates).of(&model.fitted.theta);
     let loudest = (loud.problem.coordinates).of(&loud.fitted.theta);
-    let fits = try_each(promise.starts.iter().take(starts), |start| {
+    try_found(promise.starts.iter().take(starts), |start| {
         let mut theta = begin(loud, &held, start)?;
         let mut last = None;
         for share in [0.0, 0.5] {
@@ -135,9 +135,8 @@ pub(crate) fn anneal(
             theta.clone_from(&fitted.theta);
             last = Some(fitted);
         }
-        Ok::<_, FilterError>(last)
-    })?;
-    Ok(fits.into_iter().flatten().collect())
+        Ok(last)
+    })
 }
 
 /// Fits a promise from where its noise was let down half-way, noise free.
@@ -148,8 +147,8 @@ pub(crate) fn release(
 ) -> Result<Option<Model>, FilterError> {
     let free = model.extend(&promise.term)?;
     let released = |begun: &Fitted| climb(&free.problem, &begun.theta, SEARCH.released);
-    let fits = try_each(begun, released)?.into_iter().flatten();
-    let best = fits.reduce(|a, b| if b.objective > a.objective { b } else { a });
+    let fits = try_found(begun, released)?;
+    let best = (fits.into_iter()).reduce(|a, b| if b.objective > a.objective { b } else { a });
     Ok(best.and_then(|fitted| free.fitted(model.base.clone(), fitted)))
 }
 

@@ -21,7 +21,7 @@ use crate::fit::climb::climb;
 use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::{Term, marks};
 use crate::likelihood::kalman::FilterError;
-use crate::parallel::try_each;
+use crate::parallel::{try_each, try_found};
 use explanation::{Explanation, sort};
 use fits::{Effort, anneal, fit_afresh, fit_promise, fit_unfolded, loudly, release};
 use model::Model;
@@ -155,10 +155,9 @@ fn first_fits(
         starts: 2,
         iterations: 6,
     };
-    let fits = try_each(chosen, |promise| {
+    try_found(chosen, |promise| {
         fit_promise(model, promise, thetas, effort)
-    })?;
-    Ok(fits.into_iter().flatten().collect())
+    })
 }
 
 /// Fits of all terms from the prior's centre and from unfolded records: beside the twin where it is, the right one may promise nothing.
@@ -185,11 +184,10 @@ fn annealed_fits(
     let best = (begun.iter().flatten())
         .map(|fitted| fitted.objective)
         .fold(f64::NEG_INFINITY, f64::max);
-    let fits = try_each(promises.iter().zip(begun), |(promise, mut begun)| {
+    try_found(promises.iter().zip(begun), |(promise, mut begun)| {
         begun.retain(|fitted| fitted.objective > best - SEARCH.lost);
         release(model, promise, &begun)
-    })?;
-    Ok(fits.into_iter().flatten().collect())
+    })
 }
 
 /// Gives those near the best more starts, and carries them on.

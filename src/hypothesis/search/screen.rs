@@ -9,7 +9,7 @@ use crate::fit::reference::Reference;
 use crate::hypothesis::term::{Start, Term, marks};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::descending;
-use crate::parallel::try_each;
+use crate::parallel::{try_each, try_found};
 use nalgebra::DVector;
 use std::sync::Arc;
 
@@ -60,8 +60,7 @@ pub(crate) fn scan_from(
     let mut all = try_each(terms, |term| {
         let extended = model.extend(term)?;
         let start = |start| promise(model, reference, &extended, start);
-        let starts = try_each(&term.starts, start)?;
-        let mut starts: Vec<Beginning> = starts.into_iter().flatten().collect();
+        let mut starts: Vec<Beginning> = try_found(&term.starts, start)?;
         descending(&mut starts, |a| a.nats);
         Ok::<_, FilterError>(Promise {
             term: term.clone(),
@@ -134,7 +133,7 @@ pub(crate) struct Linear {
 
 /// Unknown functions beside a model, best first.
 pub(crate) fn functions(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Linear>, FilterError> {
-    let linear = try_each(terms, |term| {
+    let mut all: Vec<Linear> = try_found(terms, |term| {
         let extended = model.extend(term)?;
         let mut best: Option<(f64, Laplace, Vec<f64>)> = None;
         for start in &term.starts {
@@ -158,7 +157,6 @@ pub(crate) fn functions(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Linear
             theta,
         }))
     })?;
-    let mut all: Vec<Linear> = linear.into_iter().flatten().collect();
     descending(&mut all, |a| a.gain);
     Ok(all)
 }

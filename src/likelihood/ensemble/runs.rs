@@ -1,6 +1,6 @@
 //! Runs of a twin at one θ under one drive, with draws that are the same at every θ.
 
-use crate::parallel::try_each;
+use crate::parallel::try_found;
 use crate::record::{Drive, Signal};
 use crate::twin::{DigitalTwin, Noise, SimulationError};
 
@@ -24,8 +24,8 @@ impl Ensemble {
     ) -> Result<Self, SimulationError> {
         drive.check_uniform().map_err(SimulationError::of)?;
         let noise = Noise::new(0, "ensemble", 0);
-        let runs = try_each(0..RUNS, |i| run(twin, theta, drive, noise.sample(i as u64)))?;
-        let runs: Vec<Signal> = runs.into_iter().flatten().collect();
+        let runs: Vec<Signal> =
+            try_found(0..RUNS, |i| run(twin, theta, drive, noise.sample(i as u64)))?;
         if runs.len() < RUNS / 2 {
             return Err(SimulationError::Diverged { at: drive.time(0) });
         }
