@@ -25,6 +25,12 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
+/// So many of what is named in the singular: `1 input`, `2 inputs`.
+pub(crate) fn count(n: usize, what: &str) -> String {
+    let plural = if n == 1 { "" } else { "s" };
+    format!("{n} {what}{plural}")
+}
+
 /// A setting that cannot be used. The message has its name, its value and the remedy.
 ///
 /// Errors of all modules carry it, so that an application reads any of them in the same way. An example is that of the

@@ -1,10 +1,12 @@
 //! The border of the program: a fault in it is one line and exit code 1, and costs no answer that was found before.
 
 use super::failure::Failure;
+use crate::storage::StorageError;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook};
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
+use std::thread;
 
 /// Place of the first fault, file and line.
 static PLACE: Mutex<Option<String>> = Mutex::new(None);
@@ -17,6 +19,19 @@ pub(super) fn keep_quiet() {
             *place = Some(format!("{}:{}", at.file(), at.line()));
         }
     }));
+}
+
+/// Stack of the program, in bytes: what systems give a process by default.
+const STACK: usize = 8 << 20;
+
+/// Works on a stack of a known size, however small that of the process is (`ulimit -s`).
+pub(super) fn on_own_stack<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+    thread::scope(|scope| {
+        let builder = thread::Builder::new().stack_size(STACK);
+        let started = builder.spawn_scoped(scope, work);
+        let started = started.map_err(|error| StorageError::threads(1, &error))?;
+        started.join().map_err(|fault| failure(&*fault))
+    })
 }
 
 /// Does work; a fault in it is a failure.

@@ -55,6 +55,14 @@ const MOST_THREADS: usize = 1024;
 pub fn run<P: Into<Project>, E: Into<StudyError>>(
     projects: impl IntoIterator<Item = Result<P, E>>,
 ) -> ExitCode {
+    let projects: Result<Vec<Project>, StudyError> = (projects.into_iter())
+        .map(|project| project.map(Into::into).map_err(Into::into))
+        .collect();
+    border::on_own_stack(|| answer(projects)).unwrap_or_else(Failure::report)
+}
+
+/// Answers the call of this process.
+fn answer(projects: Result<Vec<Project>, StudyError>) -> ExitCode {
     let ranks = match Ranks::join() {
         Ok(ranks) => ranks,
         Err(error) => return Failure::from(error).report(),
@@ -83,22 +91,17 @@ pub fn run<P: Into<Project>, E: Into<StudyError>>(
     stop::listen(verb, &words);
     border::keep_quiet();
     stop::report_file_size_limit();
-    let projects: Result<Vec<Project>, E> = (projects.into_iter())
-        .map(|project| project.map(Into::into))
-        .collect();
-    let result = projects
-        .map_err(|error| Failure::from(error.into()))
-        .and_then(|projects| {
-            let progress = progress::bars();
-            let call = Call {
-                arguments: &arguments,
-                words: &words,
-                study_file,
-                progress: &progress,
-            };
-            let work = || in_pool(arguments.threads, || call.dispatch(&projects, &ranks));
-            border::guarded(work)
-        });
+    let result = projects.map_err(Failure::from).and_then(|projects| {
+        let progress = progress::bars();
+        let call = Call {
+            arguments: &arguments,
+            words: &words,
+            study_file,
+            progress: &progress,
+        };
+        let work = || in_pool(arguments.threads, || call.dispatch(&projects, &ranks));
+        border::guarded(work)
+    });
     let result = result.map(|code| match code == ExitCode::SUCCESS && stop::asked() {
         true => {
             output::say("stopped when the result was complete");

@@ -1,8 +1,7 @@
 //! Entries of the tables of a file, with their keys.
 
 use super::error::EquationsError;
-use super::lexer::is_name;
-use super::operation::Callable;
+use super::expression::{Callable, is_name};
 use super::place::{PlacedExpression, SourceText, in_order, number};
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, hidden};

@@ -1,6 +1,6 @@
 //! Expressions as one graph: what is computed twice stands once, what is constant is computed at once.
 
-use super::operation::{Binary, Unary};
+use super::expression::{Binary, Unary};
 use std::collections::HashMap;
 
 /// Most operations and values of a twin: hundreds of states, and some megabytes of memory a thread.

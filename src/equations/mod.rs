@@ -20,9 +20,9 @@
 //! | step | file |
 //! |---|---|
 //! | tables of the file, their keys and places | `file.rs`, `place.rs`, `entries.rs`; written again: `written.rs` |
-//! | words and signs of an expression; its operations in order | `lexer.rs`, `parser.rs`, `operation.rs` |
+//! | words and signs of an expression; its operations in order | `expression/` |
 //! | names, definitions, common parts, constants | `names.rs`, `graph.rs` |
-//! | operations over blocks | `tape.rs`, `groups.rs`, `scratch.rs`, `feed.rs` |
+//! | operations over blocks | `tape/` |
 //! | events: their conditions, times and changes | `event/` |
 //! | the equations that they are | `program.rs` |
 //! | the twin | `twin.rs`, `declared.rs` |
@@ -31,17 +31,12 @@ mod declared;
 mod entries;
 mod error;
 mod event;
-mod feed;
+mod expression;
 mod file;
 mod graph;
-mod groups;
-mod lexer;
 mod names;
-mod operation;
-mod parser;
 mod place;
 mod program;
-mod scratch;
 mod tape;
 #[cfg(test)]
 mod tests;

@@ -2,8 +2,8 @@
 
 use super::entries::TableEntry;
 use super::error::EquationsError;
+use super::expression::Item;
 use super::graph::{Graph, Id, Node, Varies};
-use super::parser::Item;
 use super::place::{PlacedExpression, SourceText};
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::excerpt;

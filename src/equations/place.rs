@@ -1,8 +1,7 @@
 //! Places in the text of a file, for messages.
 
 use super::error::EquationsError;
-use super::lexer::Problem;
-use super::parser::Expression;
+use super::expression::{Expression, Problem};
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 

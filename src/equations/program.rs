@@ -1,7 +1,6 @@
 //! Computes the expressions of a text: its equations, point after point and in blocks.
 
-use super::feed::{LanesFeed, PointsFeed, TapeFeed};
-use super::tape::OperationTape;
+use super::tape::{LanesFeed, OperationTape, PointsFeed, TapeFeed};
 use crate::math::{Kernel, LANES, Lanes, widest};
 use crate::twin::{Blocks, Integrator, Interval, Now, Outline, StateSpace, Stepping};
 use smallvec::SmallVec;

@@ -51,6 +51,10 @@ impl Record {
                 return Err(RecordError::TooFewValues(full));
             }
         }
+        let outputs = match outputs.is_standard_layout() {
+            true => outputs,
+            false => outputs.as_standard_layout().into_owned(),
+        };
         Ok(Self {
             drive,
             outputs: Arc::new(outputs),
@@ -100,6 +104,12 @@ impl Record {
     /// Outputs, N × channels.
     pub fn outputs(&self) -> &Signal {
         &self.outputs
+    }
+
+    /// Outputs row by row.
+    pub(crate) fn values(&self) -> &[f64] {
+        // Rows lie one behind the other, by `new`.
+        self.outputs.as_slice().unwrap_or_default()
     }
 
     /// Least variance of each output with which no density is above one per cell of what the values are rounded to: q²/2π, 0 where they are

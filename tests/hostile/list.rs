@@ -226,6 +226,8 @@ fn limits_of_the_system_are_named() {
     let output = limited("-v 400000", call);
     one_line(call, &output, &["threads", "--threads", "ulimit -v"]);
     assert_eq!(output.status.code(), Some(2));
+    let output = limited("-s 64", "simulate --twin tanks --out tanks.csv");
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
 }
 
 #[cfg(unix)]

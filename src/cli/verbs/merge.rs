@@ -20,7 +20,7 @@ pub(in crate::cli) struct Merge {
 }
 
 /// Endings that nobody gives to a folder.
-const FILES: [&str; 6] = ["csv", "json", "npy", "npz", "parquet", "txt"];
+const FILES: [&str; 8] = ["csv", "gz", "json", "npy", "npz", "parquet", "txt", "zip"];
 
 impl Verb for Merge {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {

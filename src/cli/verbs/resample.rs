@@ -3,7 +3,7 @@
 use crate::cli::prelude::*;
 use crate::math::six_digits;
 use crate::record::{InputRule, Record, RecordError, Resampled, resample};
-use crate::setting::number;
+use crate::setting::{count, number};
 use clap::{Args, ValueEnum};
 
 /// Resample a record to one step: inputs averaged or held, outputs interpolated linearly, longer gaps left empty.
@@ -97,8 +97,8 @@ impl Resample {
         ));
         if new.record.missing() > 0 {
             lines.push(format!(
-                "{} outputs are left empty: in longer gaps (--longest-gap SECONDS closes them), or before the first or after the last measured output (remove these rows for `estimate`)",
-                new.record.missing()
+                "{} left empty: in longer gaps (--longest-gap SECONDS closes them), or before the first or after the last measured output (remove these rows for `estimate`)",
+                count(new.record.missing(), "output")
             ));
         }
         lines.join("\n")
@@ -120,11 +120,9 @@ fn grid_line(name: &str, record: &Record) -> String {
         true => format!("a step of {} s", short(record.drive().dt())),
         false => format!("steps of {} to {} s", short(low), short(high)),
     };
-    let missing = record.missing();
-    format!(
-        "{name}: {} samples, {steps}, {missing} missing outputs",
-        record.samples()
-    )
+    let samples = count(record.samples(), "sample");
+    let missing = count(record.missing(), "missing output");
+    format!("{name}: {samples}, {steps}, {missing}")
 }
 
 /// A number to six digits.

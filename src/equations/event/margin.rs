@@ -1,7 +1,7 @@
 //! Margins of conditions: above zero where they are true, and zero where they change.
 
+use crate::equations::expression::{Binary, Unary};
 use crate::equations::graph::{Graph, Id, Node};
-use crate::equations::operation::{Binary, Unary};
 use std::collections::HashMap;
 
 /// Deepest nesting of conditions: that of expressions, and some definitions of definitions.

@@ -6,9 +6,9 @@ mod tests;
 
 use super::entries::{TableEntry, entry_list};
 use super::error::EquationsError;
+use super::expression::Binary;
 use super::graph::{Graph, Id, Node, Varies};
 use super::names::Scope;
-use super::operation::Binary;
 use super::place::{SourceText, in_order, number};
 use super::tape::OperationTape;
 use crate::setting::did_you_mean;

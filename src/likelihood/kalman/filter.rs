@@ -5,7 +5,6 @@ use super::normal::clip::clip;
 use super::{FilterError, FilterSettings};
 use crate::record::Record;
 use crate::twin::{Composed, Interval, ParameterSpace, TwinError};
-use std::sync::Arc;
 
 /// A filter for many θ on one record: what does not depend on θ is prepared once.
 ///
@@ -50,7 +49,6 @@ pub struct Kalman<'a> {
     pub(super) settings: &'a FilterSettings,
     pub(super) parameters: ParameterSpace,
     pub(super) states: usize,
-    pub(super) outputs: Arc<[f64]>,
     pub(super) channels: usize,
     /// `true` if outputs are missing.
     pub(super) gaps: bool,
@@ -92,7 +90,6 @@ impl<'a> Kalman<'a> {
             settings,
             parameters: outline.parameters,
             states,
-            outputs: record.outputs().iter().copied().collect(),
             channels: record.outputs().ncols(),
             gaps: !record.is_complete(),
             limits,

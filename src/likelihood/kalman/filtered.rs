@@ -249,7 +249,7 @@ impl Kalman<'_> {
     /// with what had been shown by its first.
     fn predict_punctual(
         &self,
-        order: &Order,
+        order: &Order<'_>,
         theta: &[f64],
         states: &[Gaussian],
         to: &mut Predictions,

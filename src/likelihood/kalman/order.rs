@@ -12,10 +12,10 @@ use std::sync::Arc;
 ///
 /// A density of all values is the same in any order, and a filter need not remember d samples as states.
 #[derive(Clone)]
-pub(super) struct Order {
+pub(super) struct Order<'k> {
     /// Samples by which each output is late; empty where none is.
     dead_time: Vec<usize>,
-    values: Arc<[f64]>,
+    values: Values<'k>,
     channels: usize,
     /// Rows before the first.
     pub before: usize,
@@ -23,28 +23,35 @@ pub(super) struct Order {
     pub gaps: bool,
 }
 
-impl Order {
+/// Values of a record, row by row: its own where no output is late.
+#[derive(Clone)]
+enum Values<'k> {
+    Own(&'k [f64]),
+    Arranged(Arc<[f64]>),
+}
+
+impl<'k> Order<'k> {
     /// At θ, of which the length is checked.
-    pub fn of(kalman: &Kalman<'_>, theta: &[f64]) -> Result<Self, FilterError> {
+    pub fn of(kalman: &'k Kalman<'_>, theta: &[f64]) -> Result<Self, FilterError> {
         kalman.check(theta)?;
         let dead_time = (kalman.twin).dead_time(theta, kalman.record.drive().dt());
         let before = dead_time.iter().copied().max().unwrap_or(0);
         let mut order = Self {
             dead_time,
-            values: kalman.outputs.clone(),
+            values: Values::Own(kalman.record.values()),
             channels: kalman.channels,
             before,
             gaps: kalman.gaps || before > 0,
         };
         if before > 0 {
-            order.values = order.arranged(&kalman.outputs);
+            order.values = Values::Arranged(order.arranged(kalman.record.values()));
         }
         Ok(order)
     }
 
     /// The same without the outputs that are late, and without rows before the first.
     pub fn punctual(&self, kalman: &Kalman<'_>) -> Self {
-        let mut values = kalman.outputs.to_vec();
+        let mut values = kalman.record.values().to_vec();
         for row in values.chunks_exact_mut(self.channels) {
             for j in (0..self.channels).filter(|&j| self.is_late(j)) {
                 row[j] = f64::NAN;
@@ -52,7 +59,7 @@ impl Order {
         }
         Self {
             dead_time: vec![],
-            values: values.into(),
+            values: Values::Arranged(values.into()),
             channels: self.channels,
             before: 0,
             gaps: true,
@@ -70,6 +77,14 @@ impl Order {
             .collect()
     }
 
+    #[inline(always)]
+    fn values(&self) -> &[f64] {
+        match &self.values {
+            Values::Own(values) => values,
+            Values::Arranged(values) => values,
+        }
+    }
+
     /// Returns whether output j has a dead time.
     pub fn is_late(&self, j: usize) -> bool {
         self.dead_time.get(j).is_some_and(|late| *late > 0)
@@ -82,13 +97,13 @@ impl Order {
 
     /// Number of rows.
     pub fn rows(&self) -> usize {
-        self.values.len() / self.channels
+        self.values().len() / self.channels
     }
 
     /// Values of row i.
     #[inline(always)]
     pub fn row(&self, i: usize) -> &[f64] {
-        &self.values[i * self.channels..(i + 1) * self.channels]
+        &self.values()[i * self.channels..(i + 1) * self.channels]
     }
 
     /// Sample of the state that row i shows.

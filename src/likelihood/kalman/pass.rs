@@ -27,7 +27,7 @@ pub(super) struct Innovation<'w, N = f64> {
     pivots: &'w [N],
     /// Nats by which the density exceeds a normal one.
     excess: N,
-    order: &'w Order,
+    order: &'w Order<'w>,
     row: usize,
 }
 
@@ -112,7 +112,7 @@ impl<S: Size, N: Number> FilterState<S, N> {
 /// A record that a filter runs over, at θ.
 pub(super) struct FilterJob<'j> {
     pub kalman: &'j Kalman<'j>,
-    pub order: Order,
+    pub order: Order<'j>,
     pub theta: &'j [f64],
     /// The record's drive as the twin sees it at θ.
     pub acting: Acting<'j>,
@@ -125,7 +125,7 @@ pub(super) struct Pass<'k, S: Size, N: FilterNumber> {
     jobs: &'k [FilterJob<'k>],
     /// The first job's; so is the order.
     kalman: &'k Kalman<'k>,
-    order: &'k Order,
+    order: &'k Order<'k>,
     now: Vec<Now<'k>>,
     moments: Moments<'k, S, N>,
     update: Update<S, N>,

@@ -75,7 +75,7 @@ impl Kalman<'_> {
     /// As [`run`](Self::run), the rows in this order.
     pub(super) fn run_in(
         &self,
-        order: &Order,
+        order: &Order<'_>,
         theta: &[f64],
         sink: &mut dyn Sink,
     ) -> Result<f64, FilterError> {
@@ -105,7 +105,7 @@ impl Kalman<'_> {
     /// This filter at θ, the rows in this order.
     pub(super) fn job<'j>(
         &'j self,
-        order: &Order,
+        order: &Order<'j>,
         theta: &'j [f64],
     ) -> Result<FilterJob<'j>, FilterError> {
         Ok(FilterJob {

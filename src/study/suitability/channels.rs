@@ -13,12 +13,12 @@ const QUARTILES: f64 = 1.349;
 /// Standard deviation of a normal distribution, in median absolute deviations.
 const MEDIANS: f64 = 1.4826;
 
-/// Checks each channel; what the twin's own run shows, too, is no fault.
+/// Checks each channel; what one of the twin's own runs shows, too, is no fault.
 pub(super) fn check(
     study: &Study,
     record: &Record,
     planned: Option<&Drive>,
-    run: Option<&Signal>,
+    runs: &[Signal],
 ) -> Vec<Finding> {
     let signals = study.twin().signals();
     let mut findings = vec![];
@@ -36,11 +36,11 @@ pub(super) fn check(
     }
     for (j, output) in signals.outputs.iter().enumerate() {
         let (rows, values) = present(record.outputs(), j);
-        let own = run.map(|run| present(run, j).1);
+        let own: Vec<Vec<f64>> = runs.iter().map(|run| present(run, j).1).collect();
         let name = &output.name;
         let mut warn = |check, message| findings.push(Finding::warning(check, message));
         if is_constant(&values) {
-            if !own.is_some_and(|own| is_constant(&own)) {
+            if !own.iter().any(|own| is_constant(own)) {
                 let value = with_unit(values[0], &output.unit);
                 warn(
                     "constant",
@@ -52,7 +52,7 @@ pub(super) fn check(
             continue;
         }
         if let Some((end, value, count)) = clipped_ends(&values)
-            && own.as_deref().and_then(clipped_ends).is_none()
+            && !own.iter().any(|own| clipped_ends(own).is_some())
         {
             let value = with_unit(value, &output.unit);
             warn(
@@ -63,7 +63,7 @@ pub(super) fn check(
             );
         }
         if let Some(step) = coarse_step(&values)
-            && own.as_deref().and_then(coarse_step).is_none()
+            && !own.iter().any(|own| coarse_step(own).is_some())
         {
             let step = with_unit(step, &output.unit);
             warn(
@@ -75,8 +75,8 @@ pub(super) fn check(
             );
         }
         let outliers = outliers(&values);
-        let usual = own.map_or(0, |own| self::outliers(&own).len());
-        if outliers.len() > 2 * usual {
+        let usual = own.iter().map(|own| self::outliers(own).len()).max();
+        if outliers.len() > 2 * usual.unwrap_or(0) {
             let largest = outliers.iter().map(|(_, z)| *z).fold(0.0, f64::max);
             let named: Vec<String> = (outliers.iter().take(LIMITS.named))
                 .map(|(at, _)| record.drive().rows().line(rows[*at]).to_string())

@@ -25,7 +25,7 @@ use crate::likelihood::{measured, time_constants};
 use crate::math::three_digits;
 use crate::progress::Progress;
 use crate::record::{Drive, Quantity, Record, Signal};
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::twin::Noise;
 use crate::twin::conformance::{Finding, Severity};
 use limits::LIMITS;
@@ -88,7 +88,7 @@ impl Study {
         // Further checks are not to repeat what is known: they see the record in the right units.
         let record = size::with_inputs_divided(time::in_seconds(record, unit)?, &factors)?;
         // With noise, at the centre of the prior and at draws of it; those that diverge are left out.
-        let (mut centre, mut runs) = (None, vec![]);
+        let mut runs = vec![];
         let space = self.twin.parameters();
         for draw in 0..=LIMITS.draws {
             let noise = noise.sample(draw);
@@ -97,19 +97,10 @@ impl Study {
                 _ => space.draw_prior(noise),
             };
             let run = self.twin.simulate(&theta, record.drive(), noise).ok();
-            let run = run.filter(|run| run.iter().all(|v| v.is_finite()));
-            if draw == 0 {
-                centre.clone_from(&run);
-            }
-            runs.extend(run);
+            runs.extend(run.filter(|run| run.iter().all(|v| v.is_finite())));
             stage.tick()?;
         }
-        findings.extend(channels::check(
-            self,
-            &record,
-            planned_drive,
-            centre.as_ref(),
-        ));
+        findings.extend(channels::check(self, &record, planned_drive, &runs));
         let (found, order) = swapped::check(self, &record, &runs);
         findings.extend(found);
         let record = swapped::in_order(&record, &order)?;
@@ -149,10 +140,10 @@ impl Study {
 fn described(record: &Record, outputs: &[Quantity]) -> Vec<Finding> {
     let drive = record.drive();
     let size = format!(
-        "{} inputs, {} outputs, {} samples at {} s",
-        drive.inputs().ncols(),
-        record.outputs().ncols(),
-        record.samples(),
+        "{}, {}, {} at {} s",
+        count(drive.inputs().ncols(), "input"),
+        count(record.outputs().ncols(), "output"),
+        count(record.samples(), "sample"),
         text(drive.dt())
     );
     let mut findings = vec![Finding::pass("channels", size)];
@@ -169,15 +160,15 @@ fn described(record: &Record, outputs: &[Quantity]) -> Vec<Finding> {
     }
     if drive.replicates() > 0 {
         let message = format!(
-            "{} rows have the time of the row before: fits and diagnoses take them as readings of one state; an estimate needs one row a time",
-            drive.replicates()
+            "{} with the time of the row before: fits and diagnoses take such rows as readings of one state; an estimate needs one row a time",
+            count(drive.replicates(), "row")
         );
         findings.push(Finding::pass("replicates", message));
     }
     if !record.is_complete() {
         let message = format!(
-            "{} outputs are missing: fits and diagnoses leave them out; an estimate needs the record resampled",
-            record.missing()
+            "{} missing: fits and diagnoses leave out what is missing; an estimate needs the record resampled",
+            count(record.missing(), "output value")
         );
         findings.push(Finding::pass("gaps", message));
     }

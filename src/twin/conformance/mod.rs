@@ -21,7 +21,7 @@ pub(crate) use step::{StepLength, blamed_step, check_step, step_length};
 
 use crate::math::{six_digits, thin_svd};
 use crate::record::{Drive, Signal, check_sizes};
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::twin::{
     DigitalTwin, Noise, PRIOR_DEVIATION, Parameter, ParameterSpace, SimulationError, combination,
 };
@@ -197,7 +197,8 @@ impl Setting<'_> {
         if let Err(error) = check_sizes(first, "output", &self.twin.signals().outputs) {
             return failed(format!("at the prior's centre {error}"));
         }
-        Ok(format!("{} samples, {} outputs", expected.0, expected.1))
+        let (samples, outputs) = (count(expected.0, "sample"), count(expected.1, "output"));
+        Ok(format!("{samples}, {outputs}"))
     }
 
     /// Corners of the prior box: all of them up to six parameters, 64 spread ones beyond.

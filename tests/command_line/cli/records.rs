@@ -187,7 +187,7 @@ fn gaps_and_varying_steps_are_resampled() {
     let out = place.at("even.csv");
     let text = done(&["resample", &gaps, "--step", "0.5", "--out", &out]);
     for part in [
-        "gaps.csv: 399 samples, steps of 0.5 to 1 s, 1 missing outputs",
+        "gaps.csv: 399 samples, steps of 0.5 to 1 s, 1 missing output",
         "even.csv: 400 samples, a step of 0.5 s, 0 missing outputs",
         "inputs: mean over each step",
         "outputs: 2 interpolated, over at most 2 s between measured ones",
@@ -206,7 +206,7 @@ fn gaps_and_varying_steps_are_resampled() {
     let text = done(&[&call[..], &["0.9", "--out", &open]].concat());
     let parts = [
         "outputs: 0 interpolated, over at most 0.9 s",
-        "2 outputs are left empty: in longer gaps (--longest-gap SECONDS closes them)",
+        "2 outputs left empty: in longer gaps (--longest-gap SECONDS closes them)",
     ];
     assert!(parts.iter().all(|part| text.contains(part)), "{text}");
     let none = place.at("none.csv");

@@ -3,10 +3,15 @@
 //! Numbers stand in groups of `G`. What differs from point to point has one group for every `G` points; what is the same for all of
 //! them, or belongs to a lane, has one. What θ alone decides is computed again only where θ has changed.
 
-use super::feed::TapeFeed;
+mod feed;
+mod groups;
+mod scratch;
+
+pub(super) use feed::{LanesFeed, PointsFeed, TapeFeed};
+
 use super::graph::{Graph, Id, Node, Varies};
-use super::groups::{Place, PlacedOperation, Work, load, store};
-use super::scratch::{Numbers, keep_numbers, new_id, take_numbers};
+use groups::{Place, PlacedOperation, Work, load, store};
+use scratch::{Numbers, keep_numbers, new_id, take_numbers};
 use std::cell::Cell;
 
 /// Numbers of a value that go through an operation together: those of all values of a small twin then stay in the fastest memory. Twice

@@ -4,7 +4,7 @@ use crate::math::{LANES, Lanes};
 use crate::twin::Now;
 
 /// A source of what a tape computes: numbers in groups of `G`.
-pub(super) trait TapeFeed<const G: usize> {
+pub(in crate::equations) trait TapeFeed<const G: usize> {
     /// Number of groups of points.
     fn groups(&self) -> usize;
     fn parameter(&self, index: usize) -> [f64; G];
@@ -16,7 +16,7 @@ pub(super) trait TapeFeed<const G: usize> {
 }
 
 /// PointsFeed of one moment, one after the other.
-pub(super) struct PointsFeed<'p, 'n> {
+pub(in crate::equations) struct PointsFeed<'p, 'n> {
     pub now: &'p Now<'n>,
     pub x: &'p [f64],
     /// Numbers from one point to the next.
@@ -64,7 +64,7 @@ impl<const G: usize> TapeFeed<G> for PointsFeed<'_, '_> {
 }
 
 /// PointsFeed of several moments, one a lane. Lanes that are not used are those of the first.
-pub(super) struct LanesFeed<'p, 'n, L, T> {
+pub(in crate::equations) struct LanesFeed<'p, 'n, L, T> {
     pub now: &'p [Now<'n>],
     pub points: usize,
     /// Number of states.

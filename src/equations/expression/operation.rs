@@ -3,12 +3,12 @@
 use std::cell::Cell;
 
 /// Work on all numbers of a block, compiled once for each function of one number.
-pub(super) trait OnOne {
+pub(in crate::equations) trait OnOne {
     fn each(self, function: impl Fn(f64) -> f64);
 }
 
 /// As [`OnOne`], for functions of two numbers.
-pub(super) trait OnTwo {
+pub(in crate::equations) trait OnTwo {
     fn each(self, function: impl Fn(f64, f64) -> f64);
 }
 
@@ -16,7 +16,7 @@ macro_rules! operations {
     ($(#[$doc:meta])* $Kind:ident, $Work:ident, $($Name:ident => $function:expr),+ $(,)?) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        pub(super) enum $Kind { $($Name),+ }
+        pub(in crate::equations) enum $Kind { $($Name),+ }
 
         impl $Kind {
             /// Hands the function to a loop.
@@ -112,7 +112,7 @@ impl Binary {
 
 /// A function as expressions call it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Callable {
+pub(in crate::equations) enum Callable {
     One(Unary),
     Two(Binary),
     /// Two numbers or more, from the left.
@@ -124,7 +124,7 @@ pub(super) enum Callable {
 }
 
 /// Scope of functions.
-pub(super) const FUNCTIONS: [(&str, Callable); 23] = [
+pub(in crate::equations) const FUNCTIONS: [(&str, Callable); 23] = [
     ("min", Callable::Several(Binary::Min)),
     ("max", Callable::Several(Binary::Max)),
     ("abs", Callable::One(Unary::Abs)),

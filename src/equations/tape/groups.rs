@@ -1,6 +1,6 @@
 //! Operations over groups of numbers.
 
-use super::operation::{Binary, OnOne, OnTwo, Unary};
+use crate::equations::expression::{Binary, OnOne, OnTwo, Unary};
 use std::cell::Cell;
 
 /// First number of a value, and the way from one group to the next.

@@ -17,7 +17,7 @@ const SIGNS: [&str; 15] = [
 ];
 
 /// A problem at a byte of an expression.
-pub(super) type Problem = (usize, String);
+pub(in crate::equations) type Problem = (usize, String);
 
 /// Splits an expression into tokens, each with its byte; the last is [`Token::End`].
 pub(super) fn tokens(text: &str) -> Result<Vec<(usize, Token<'_>)>, Problem> {
@@ -90,7 +90,7 @@ fn continues_name(c: char) -> bool {
 }
 
 /// Returns whether expressions can call something by this name.
-pub(super) fn is_name(name: &str) -> bool {
+pub(in crate::equations) fn is_name(name: &str) -> bool {
     name.starts_with(begins_name) && name.chars().all(continues_name)
 }
 

@@ -11,7 +11,7 @@ const DEEPEST: usize = 100;
 
 /// An operation on numbers that stand before it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Item {
+pub(in crate::equations) enum Item {
     Number(f64),
     /// A name, at a byte of the text.
     Name(String, usize),
@@ -22,7 +22,7 @@ pub(super) enum Item {
 
 /// An expression, operands before their operation.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Expression(pub Vec<Item>);
+pub(in crate::equations) struct Expression(pub Vec<Item>);
 
 impl Expression {
     /// A number.
