@@ -226,7 +226,7 @@ fn limits_of_the_system_are_named() {
     let output = limited("-v 400000", call);
     one_line(call, &output, &["threads", "--threads", "ulimit -v"]);
     assert_eq!(output.status.code(), Some(2));
-    let output = limited("-s 64", "simulate --twin tanks --out tanks.csv");
+    let output = limited("-s 64", "effects --twin tanks");
     assert_eq!(output.status.code(), Some(0), "{output:?}");
 }
 

@@ -3,7 +3,7 @@
 use crate::cli::prelude::*;
 use crate::diagnose::Ablation;
 use crate::evaluate::MOST_RECORDS;
-use crate::evaluate::trials::{self, Families, Kind, TrialSettings};
+use crate::evaluate::trials::{self, Families, Kind, NuisanceKind, TrialSettings};
 use crate::setting::did_you_mean;
 use crate::storage::work::Share;
 
@@ -28,6 +28,9 @@ pub(in crate::cli) struct Withheld {
     /// Kinds of truth [default: all].
     #[arg(long, value_name = "KIND,..", value_delimiter = ',', value_parser = kind)]
     kinds: Option<Vec<Kind>>,
+    /// Nuisances, of which each record has one [default: half of the records have one of all].
+    #[arg(long, value_name = "KIND,..", value_delimiter = ',', value_parser = nuisance)]
+    nuisances: Vec<NuisanceKind>,
     /// Families of random laws: open to choose constants with, closed for reports.
     #[arg(long, value_name = "HALF", default_value = "all")]
     families: Families,
@@ -74,6 +77,7 @@ impl Verb for Withheld {
             trials: self.trials,
             seed: context.seed,
             kinds: self.kinds.clone().unwrap_or(Kind::ALL.to_vec()),
+            nuisances: self.nuisances.clone(),
             families: self.families,
             like: like.transpose()?,
             without: self.without,
@@ -126,6 +130,12 @@ fn ablation(text: &str) -> Result<Ablation, String> {
 /// Parses a kind of truth.
 fn kind(text: &str) -> Result<Kind, String> {
     known("kind", Kind::named(text), text, &Kind::ALL.map(Kind::id))
+}
+
+/// Parses a nuisance.
+fn nuisance(text: &str) -> Result<NuisanceKind, String> {
+    let all = NuisanceKind::ALL.map(NuisanceKind::id);
+    known("nuisance", NuisanceKind::named(text), text, &all)
 }
 
 /// The value found by its name; else an error that lists the names.

@@ -18,7 +18,7 @@ pub(crate) fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f6
     let keys = |names: &[&str]| -> Vec<String> { names.iter().map(|n| (*n).into()).collect() };
     let called = !accepted.is_empty();
     let right = |key: &&str| match kind {
-        Kind::Random => vec![],
+        _ if kind.is_random() => vec![],
         _ => keys(&[key]),
     };
     let named = |key: &&str| NamedEffect {

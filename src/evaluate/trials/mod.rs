@@ -52,3 +52,4 @@ pub use run::{Sealed, Withheld};
 pub use score::Scorecard;
 pub(crate) use score::{Breakdown, BreakdownLine};
 pub use settings::{Kind, TrialSettings};
+pub use world::NuisanceKind;

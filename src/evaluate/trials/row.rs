@@ -93,7 +93,7 @@ impl TrialRow {
 
     /// Name of the nuisance.
     pub fn nuisance(&self) -> String {
-        self.truth.conditions.nuisance.to_string()
+        self.truth.conditions.nuisance.id().to_owned()
     }
 
     /// Returns true if a structural gap was stated.

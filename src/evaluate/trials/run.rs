@@ -69,7 +69,8 @@ impl<'a> Withheld<'a> {
         if settings.kinds.is_empty() {
             return Err(EvaluateError::Nothing("kinds"));
         }
-        let sampler = TruthSampler::new(study, settings.families, settings.like.as_ref())?;
+        let drawn = (settings.families, settings.nuisances.clone());
+        let sampler = TruthSampler::new(study, drawn, settings.like.as_ref())?;
         for kind in &settings.kinds {
             sampler.check(*kind)?;
         }
@@ -136,6 +137,7 @@ impl<'a> Withheld<'a> {
         let study = self.sampler.study();
         let settings = &self.settings;
         let kinds: Vec<&str> = settings.kinds.iter().map(|kind| kind.id()).collect();
+        let nuisances: Vec<&str> = settings.nuisances.iter().map(|kind| kind.id()).collect();
         let like = settings.like.as_ref();
         let like = like.map(|record| sha256(record_csv_text(record).as_bytes()));
         Ok(study
@@ -143,6 +145,7 @@ impl<'a> Withheld<'a> {
             .with("trials", settings.trials)
             .with("seed", settings.seed)
             .with("kinds", json!(kinds))
+            .with("nuisances", json!(nuisances))
             .with("without", settings.without)
             .with("families", settings.families.to_string())
             .with("like", like)

@@ -1,6 +1,6 @@
 //! Settings of sealed trials, and the kinds of truth.
 
-use super::Families;
+use super::{Families, NuisanceKind};
 use crate::diagnose::Ablation;
 use crate::record::Record;
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,7 @@ use std::fmt;
 /// | `trials` | 100 | records |
 /// | `seed` | 1 | of truths, records and diagnoses |
 /// | `kinds` | all | kinds of truth, assigned in the proportions of docs/withheld.md |
+/// | `nuisances` | none | nuisances of which each record has one; without a choice, half of the records have one of all |
 /// | `families` | all | half of the families that random laws come from |
 /// | `like` | no | a measured record whose inputs, length, step and gaps the trials have |
 /// | `without` | no | whether the true effects are taken out of the library: then every trial with one must abstain |
@@ -28,6 +29,8 @@ pub struct TrialSettings {
     pub seed: u64,
     /// Kinds of truth.
     pub kinds: Vec<Kind>,
+    /// Nuisances of which each record has one; where there are none, half of the records have one of all.
+    pub nuisances: Vec<NuisanceKind>,
     /// Families of random laws.
     pub families: Families,
     /// Record whose inputs, length, step and gaps the trials have.
@@ -50,6 +53,7 @@ impl Default for TrialSettings {
             trials: 100,
             seed: 1,
             kinds: Kind::ALL.to_vec(),
+            nuisances: vec![],
             families: Families::default(),
             like: None,
             without: false,
@@ -76,6 +80,8 @@ pub enum Kind {
     Otherwise,
     /// A random law: a structural gap, and none of the listed effects.
     Random,
+    /// A random law of what was before, by a play or a fading mean: the same.
+    Memory,
     /// Two listed laws at different places: both to be accepted.
     Pair,
     /// θ outside the prior and a listed law: to be named.
@@ -84,25 +90,28 @@ pub enum Kind {
 
 /// Names in calls and files, numbers of trials among twenty, right answers; in the order of the kinds.
 #[rustfmt::skip] // One row a kind.
-const TABLE: [(Kind, &str, usize, &str); 7] = [
+const TABLE: [(Kind, &str, usize, &str); 8] = [
     (Kind::None, "none", 4, "no structural gap"),
     (Kind::Outside, "outside", 3, "no structural gap; a parameter gap may be seen"),
     (Kind::Listed, "listed", 4, NAMED),
     (Kind::Otherwise, "otherwise", 2, NAMED),
-    (Kind::Random, "random", 4, "structural, none of the listed effects"),
+    (Kind::Random, "random", 3, UNNAMED),
+    (Kind::Memory, "memory", 1, UNNAMED),
     (Kind::Pair, "pair", 1, "structural, both effects and nothing false accepted"),
     (Kind::Beside, "beside", 2, NAMED),
 ];
+const UNNAMED: &str = "structural, none of the listed effects";
 const NAMED: &str = "structural, the true effect and nothing false accepted";
 
 impl Kind {
     /// All, in the order of tables.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::None,
         Self::Outside,
         Self::Listed,
         Self::Otherwise,
         Self::Random,
+        Self::Memory,
         Self::Pair,
         Self::Beside,
     ];
@@ -125,6 +134,11 @@ impl Kind {
     /// Returns true if no θ explains the record.
     pub fn is_structural(self) -> bool {
         !matches!(self, Self::None | Self::Outside)
+    }
+
+    /// Returns true if the law is a random one.
+    pub(super) fn is_random(self) -> bool {
+        matches!(self, Self::Random | Self::Memory)
     }
 
     /// Returns true if θ lies outside the prior.

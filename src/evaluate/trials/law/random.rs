@@ -55,6 +55,11 @@ impl LawFamily {
             .flat_map(|generator| shapes.map(|shape| Self { generator, shape }))
             .collect()
     }
+
+    /// Returns true if a law depends on what was before.
+    pub fn has_memory(self) -> bool {
+        matches!(self.shape, LawShape::Hysteretic | LawShape::Memory)
+    }
 }
 
 impl fmt::Display for LawFamily {
@@ -193,7 +198,7 @@ impl RandomLaw {
         for (z, argument) in z.iter_mut().zip(&self.arguments) {
             *z = argument.at(now).clamp(-2.0, 2.0);
         }
-        if matches!(self.family.shape, LawShape::Hysteretic | LawShape::Memory) {
+        if self.family.has_memory() {
             z[0] = memory.first().map_or(z[0], |m| m.clamp(-2.0, 2.0));
         }
         let z = &z[..self.arguments.len()];

@@ -102,7 +102,7 @@ fn by_nats(
     let bins = ["listed", "random"].into_iter().flat_map(|truths| {
         NATS.array_windows().map(move |[low, high]| {
             let is_inside = |row: &&TrialRow| {
-                let is_random = row.truth.kind == Kind::Random;
+                let is_random = row.truth.kind.is_random();
                 let within = |nats: f64| (*low == 0.0 || *low <= nats) && nats < *high;
                 !row.is_null() && is_random == (truths == "random") && nats(row).is_some_and(within)
             };

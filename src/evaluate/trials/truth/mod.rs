@@ -72,6 +72,7 @@ pub(super) enum Reject {
     Still,
     NoFilter,
     NoLaw,
+    NoNuisance,
     TooWeak,
     TooAlike,
 }
@@ -84,6 +85,7 @@ impl Reject {
             Self::Still => "had an output that never moves",
             Self::NoFilter => "could not be filtered",
             Self::NoLaw => "had no law that could be made",
+            Self::NoNuisance => "could have none of these nuisances",
             Self::TooWeak => "did not show in the outputs, or diverged before they did",
             Self::TooAlike => "had two departures of which one explains or hides the other",
         }

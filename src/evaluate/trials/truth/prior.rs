@@ -1,10 +1,11 @@
 //! θ and the conditions of a record.
 
 use crate::evaluate::trials::Kind;
+use crate::evaluate::trials::NuisanceKind;
 use crate::evaluate::trials::draft::index;
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::scene::Scene;
-use crate::evaluate::trials::world::{Conditions, Feedback, NuisanceKind};
+use crate::evaluate::trials::world::{Conditions, Feedback};
 use crate::twin::{Parameter, ParameterSpace, Role, Source};
 
 /// Lags in samples at which an output may answer an input, for the sign of a feedback.
@@ -75,12 +76,13 @@ pub(super) fn nuisances(scene: &Scene, is_noisy: bool) -> Vec<NuisanceKind> {
             NuisanceKind::Level,
             NuisanceKind::Coloured,
             NuisanceKind::HeavyTailed,
+            NuisanceKind::ProportionalNoise,
         ]);
     }
     if has_states {
-        all.push(NuisanceKind::Start);
+        all.extend([NuisanceKind::Start, NuisanceKind::OperatingPoint]);
         if !scene.inputs.is_empty() {
-            all.push(NuisanceKind::ClosedLoop);
+            all.extend([NuisanceKind::ClosedLoop, NuisanceKind::SampledInput]);
         }
     }
     all
@@ -90,7 +92,7 @@ pub(super) fn nuisances(scene: &Scene, is_noisy: bool) -> Vec<NuisanceKind> {
 pub(super) fn conditions(
     scene: &Scene,
     is_silent: bool,
-    allowed: &[NuisanceKind],
+    (allowed, probability): (&[NuisanceKind], f64),
     source: &mut Source,
 ) -> Conditions {
     let mut conditions = Conditions::declared();
@@ -102,8 +104,8 @@ pub(super) fn conditions(
         conditions.added = levels.collect();
     }
     // Both draws are made whatever comes of them.
-    let (happens, choice) = (source.happens(TRIAL.nuisance_probability), source.uniform());
-    if !happens || allowed.is_empty() {
+    let (happens, choice) = (source.happens(probability), source.uniform());
+    if !happens {
         return conditions;
     }
     let choice = (choice * allowed.len() as f64) as usize;
@@ -116,6 +118,12 @@ pub(super) fn conditions(
         }
         NuisanceKind::Coloured => conditions.colour = between(source, 0.3, 0.9),
         NuisanceKind::HeavyTailed => conditions.freedom = Some(3 + index(source, 3) as u32),
+        NuisanceKind::ProportionalNoise => conditions.proportional = between(source, 0.02, 0.08),
+        NuisanceKind::OperatingPoint => {
+            let share = between(source, 0.2, 0.8);
+            conditions.lead = (share * scene.run.drive.samples() as f64).ceil() as usize;
+        }
+        NuisanceKind::SampledInput => conditions.sampled = true,
         NuisanceKind::Start => {
             conditions.start = (scene.states.iter())
                 .map(|size| 0.3 * size.deviation * source.normal())

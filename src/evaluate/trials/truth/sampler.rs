@@ -14,7 +14,7 @@ use crate::evaluate::trials::places::Structure;
 use crate::evaluate::trials::places::TwinPlaces;
 use crate::evaluate::trials::scene::Scene;
 use crate::evaluate::trials::world::{Conditions, RecordNoise, System, equations, run};
-use crate::evaluate::trials::{Families, Kind};
+use crate::evaluate::trials::{Families, Kind, NuisanceKind};
 use crate::record::{Drive, Record, Signal};
 use crate::study::{DriveSource, Study};
 use crate::twin::{Noise, ParameterSpace, Source};
@@ -54,6 +54,8 @@ pub(in crate::evaluate::trials) struct TruthSampler<'a> {
     plan: Plan,
     listed: Vec<Listed>,
     families: Families,
+    /// Those of which each record has one; half of the records have one of all where there are none.
+    nuisances: Vec<NuisanceKind>,
     is_silent: bool,
 }
 
@@ -61,7 +63,7 @@ impl<'a> TruthSampler<'a> {
     /// Creates a sampler over the study's own twin; inputs and gaps are those of `like`, or else the study's plan.
     pub fn new(
         study: &'a Study,
-        families: Families,
+        (families, nuisances): (Families, Vec<NuisanceKind>),
         like: Option<&Record>,
     ) -> Result<Self, EvaluateError> {
         let twin = study.twin();
@@ -80,6 +82,7 @@ impl<'a> TruthSampler<'a> {
             places,
             plan,
             families,
+            nuisances,
             is_silent: false,
         };
         sampler.is_silent = sampler.finds_silence()?;
@@ -108,8 +111,10 @@ impl<'a> TruthSampler<'a> {
             _ if kind.is_outside() && !has_room(&self.space) => {
                 "the bounds leave no room outside the prior; widen them"
             }
-            Kind::Random if self.places.all().next().is_none() => "the twin has no place for one",
-            Kind::None | Kind::Outside | Kind::Random => return Ok(()),
+            _ if kind.is_random() && self.places.all().next().is_none() => {
+                "the twin has no place for one"
+            }
+            Kind::None | Kind::Outside | Kind::Random | Kind::Memory => return Ok(()),
             _ if first.is_none() => {
                 "the library leaves no effect that trials can make; allow more effects"
             }
@@ -169,8 +174,17 @@ impl<'a> TruthSampler<'a> {
             return Err(Reject::Still.into());
         }
         let is_noisy = self.is_silent || equations(self.study.twin()).is_some();
-        let allowed = nuisances(&scene, is_noisy);
-        let conditions = conditions(&scene, self.is_silent, &allowed, source);
+        let mut allowed = nuisances(&scene, is_noisy);
+        let mut probability = TRIAL.nuisance_probability;
+        if !self.nuisances.is_empty() {
+            allowed.push(NuisanceKind::None);
+            allowed.retain(|kind| self.nuisances.contains(kind));
+            probability = 1.0;
+        }
+        if allowed.is_empty() {
+            return Err(Reject::NoNuisance.into());
+        }
+        let conditions = conditions(&scene, self.is_silent, (&allowed, probability), source);
         let system = System::new(&theta, &conditions);
         let experiment = Experiment::new(self.study, system, &scene)?;
         let mut truth = Truth {
@@ -275,10 +289,12 @@ impl<'a> TruthSampler<'a> {
                 let second = listed(&others, source)?;
                 vec![first, second]
             }
-            Kind::Random => {
+            Kind::Random | Kind::Memory => {
                 let place = self.places.draw(source)?;
-                let families = self.families.at(place);
-                let family = families[index(source, families.len())];
+                let mut families = self.families.at(place);
+                families.retain(|family| kind == Kind::Random || family.has_memory());
+                // A half of the families may have none with a memory at this place.
+                let family = *families.get(index(source, families.len().max(1)))?;
                 vec![(Draft::random(family, place, scene, source)?, None)]
             }
         })

@@ -35,7 +35,7 @@ pub(super) fn run(
     };
     sense(false, &mut outputs);
     for ((_, j), y) in outputs.indexed_iter_mut() {
-        *y += conditions.measurement * conditions.added_to(j) * measurement[j].next();
+        *y += conditions.measurement_at(j, *y, 0.0) * measurement[j].next();
     }
     sense(true, &mut outputs);
     if !outputs.iter().all(|y| y.abs() < TRIAL.diverged) {

@@ -2,14 +2,23 @@
 
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::record::Signal;
-use crate::twin::{Noise, Source};
+use crate::twin::{Hold, Noise, Source};
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
-/// Kind of condition that the twin does not describe.
+/// Condition of a record that its twin does not describe, and that is no gap of it. Sizes are in docs/withheld.md.
+///
+/// ```
+/// use truetwin::evaluate::trials::{NuisanceKind, TrialSettings};
+///
+/// // Each record has one of these; without a choice, half of the records have one of all.
+/// let nuisances = vec![NuisanceKind::OperatingPoint, NuisanceKind::SampledInput];
+/// let settings = TrialSettings { nuisances, ..TrialSettings::default() };
+/// assert_eq!(settings.nuisances[0].id(), "operating-point");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::evaluate::trials) enum NuisanceKind {
+#[non_exhaustive]
+pub enum NuisanceKind {
     /// Everything as declared.
     None,
     /// Noise levels other than those declared.
@@ -18,17 +27,54 @@ pub(in crate::evaluate::trials) enum NuisanceKind {
     Coloured,
     /// Noise with Student's t distribution.
     HeavyTailed,
+    /// Measurement noise that grows with the signal.
+    ProportionalNoise,
     /// Another first state.
     Start,
+    /// The record begins in the middle of a run.
+    OperatingPoint,
     /// Inputs that depend on the outputs.
     ClosedLoop,
+    /// Inputs that move between the samples.
+    SampledInput,
     /// Missing samples.
     Gaps,
 }
 
-impl fmt::Display for NuisanceKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.serialize(f)
+impl NuisanceKind {
+    /// All, in the order of tables.
+    pub const ALL: [Self; 10] = [
+        Self::None,
+        Self::Level,
+        Self::Coloured,
+        Self::HeavyTailed,
+        Self::ProportionalNoise,
+        Self::Start,
+        Self::OperatingPoint,
+        Self::ClosedLoop,
+        Self::SampledInput,
+        Self::Gaps,
+    ];
+
+    /// As in calls and files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Level => "level",
+            Self::Coloured => "coloured",
+            Self::HeavyTailed => "heavy-tailed",
+            Self::ProportionalNoise => "proportional-noise",
+            Self::Start => "start",
+            Self::OperatingPoint => "operating-point",
+            Self::ClosedLoop => "closed-loop",
+            Self::SampledInput => "sampled-input",
+            Self::Gaps => "gaps",
+        }
+    }
+
+    /// The nuisance with this id.
+    pub fn named(id: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.id() == id)
     }
 }
 
@@ -54,9 +100,18 @@ pub(in crate::evaluate::trials) struct Conditions {
     pub colour: f64,
     /// Degrees of freedom of Student's t; none for normal noise.
     pub freedom: Option<u32>,
+    /// Deviation of further measurement noise, as a share of the value that it is added to.
+    #[serde(default)]
+    pub proportional: f64,
     /// Shift of each state at the first sample.
     pub start: Vec<f64>,
+    /// Samples for which the system has run before the first, under the last inputs of the record.
+    #[serde(default)]
+    pub lead: usize,
     pub feedback: Option<Feedback>,
+    /// True if inputs go on a line from sample to sample, whatever the twin makes of them.
+    #[serde(default)]
+    pub sampled: bool,
     /// Share of samples that are missing.
     pub gaps: f64,
     /// Standard deviation of measurement noise added to each output of a twin that declares no noise.
@@ -72,8 +127,11 @@ impl Conditions {
             measurement: 1.0,
             colour: 0.0,
             freedom: None,
+            proportional: 0.0,
             start: vec![],
+            lead: 0,
             feedback: None,
+            sampled: false,
             gaps: 0.0,
             added: vec![],
         }
@@ -95,9 +153,24 @@ impl Conditions {
         }
     }
 
+    /// Standard deviation of the measurement noise of output `j` where its value is `y` and its declared noise `declared`.
+    pub(super) fn measurement_at(&self, j: usize, y: f64, declared: f64) -> f64 {
+        let level = self.measurement * declared.hypot(self.added_to(j));
+        level.hypot(self.proportional * y)
+    }
+
     /// Standard deviation of measurement noise added to output `j`.
     pub fn added_to(&self, j: usize) -> f64 {
         self.added.get(j).copied().unwrap_or(0.0)
+    }
+
+    /// What inputs do from sample to sample.
+    pub(super) fn holds(&self, twin: &[Hold]) -> Vec<Hold> {
+        let own = |hold: &Hold| match (hold, self.sampled) {
+            (Hold::Zero, true) => Hold::Linear,
+            _ => *hold,
+        };
+        twin.iter().map(own).collect()
     }
 
     /// Empties samples in blocks, never all of a channel.

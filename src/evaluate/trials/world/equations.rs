@@ -1,12 +1,12 @@
 //! A world of equations: Runge–Kutta steps of its own, ten a sample.
 
-use super::{RecordNoise, System, WorldRun};
+use super::{Conditions, RecordNoise, System, WorldRun};
 use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, Moment, above};
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::math::nearest;
 use crate::record::{Drive, Signal};
 use crate::twin::{Acting, Bends, Between, Composed, DeadTime, Interval, Noise, Now};
-use ndarray::ArrayView1;
+use ndarray::{ArrayView1, s};
 
 /// Makes a record; `None` where a state diverges.
 pub(super) fn run(
@@ -29,7 +29,10 @@ pub(super) fn run(
     let mut process = conditions.noises(draws.process, "state", n);
     let mut measurement = conditions.noises(draws.measurement, "sensor", p);
     let mut x = vec![0.0; n];
-    plant.begin(system, drive, draws.process, &mut x)?;
+    match conditions.lead {
+        0 => plant.begin(system, drive, draws.process, &mut x)?,
+        lead => x = behind_lead(twin, system, drive, (draws, lead))?,
+    }
     let samples = drive.samples();
     let mut inputs = drive.inputs().clone();
     let mut sent = Sent::new(twin, system.theta, drive)?;
@@ -38,7 +41,7 @@ pub(super) fn run(
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let (mut y, mut rate) = (vec![0.0; p], vec![0.0; n]);
     let mut dead_time = DeadTime::of(twin, system.theta, drive.dt());
-    let holds = twin.holds();
+    let holds = conditions.holds(&twin.holds());
     // Of the record's inputs: what departs moves the ends of a curve.
     let bends = Bends::of(drive, &holds);
     for k in 0..samples {
@@ -62,7 +65,7 @@ pub(super) fn run(
         twin.noise(&now, &x, &mut q, &mut r);
         plant.sense(&moment, dt, false, &mut y);
         for (j, y) in y.iter_mut().enumerate() {
-            let level = conditions.measurement * r[j].hypot(conditions.added_to(j));
+            let level = conditions.measurement_at(j, *y, r[j]);
             *y += draws.sign * level * measurement[j].next();
         }
         plant.sense(&moment, dt, true, &mut y);
@@ -107,6 +110,35 @@ pub(super) fn run(
         states,
         rates,
     })
+}
+
+/// The last state of a run that ends a sample before the record.
+fn behind_lead(
+    twin: &Composed,
+    system: System<'_>,
+    drive: &Drive,
+    (draws, lead): (RecordNoise, usize),
+) -> Option<Vec<f64>> {
+    let first = drive.samples().saturating_sub(lead);
+    let inputs = drive.inputs().slice(s![first.., ..]).to_owned();
+    let duration = inputs.nrows() as f64 * drive.dt();
+    let before = Drive::new(drive.dt(), inputs).ok()?;
+    let before = before.beginning_at(drive.first_time() - duration);
+    let conditions = Conditions {
+        lead: 0,
+        gaps: 0.0,
+        ..system.conditions.clone()
+    };
+    let system = System {
+        conditions: &conditions,
+        ..system
+    };
+    let states = run(twin, system, &before, draws.earlier())?.states;
+    states
+        .rows()
+        .into_iter()
+        .next_back()
+        .map(|row| row.to_vec())
 }
 
 /// Inputs as departures leave them, on their way through the twin's own actuators. A controller answers row by row, so that they are not
@@ -361,6 +393,43 @@ mod tests {
             (variance / expected - 1.0).abs() < 0.15,
             "{variance} {expected}"
         );
+    }
+
+    /// From 1 the decay comes to rest at u/k = 0.714; a share of that is its noise.
+    #[test]
+    fn a_run_before_the_record_and_noise_in_proportion_are_as_they_are_called() {
+        let conditions = Conditions {
+            lead: 160,
+            ..Conditions::declared()
+        };
+        let first = made(0.0, &[], &conditions).outputs[[0, 0]];
+        assert!((first - 0.5 / 0.7).abs() < 1e-4, "{first}");
+        let conditions = Conditions {
+            proportional: 0.1,
+            ..conditions
+        };
+        let outputs = made(0.0, &[], &conditions).outputs;
+        let share = crate::math::deviation(&outputs.column(0).to_vec()) * 0.7 / 0.5;
+        assert!((0.085..0.115).contains(&share), "{share}");
+    }
+
+    /// Of u = t behind a sample, the mean over the step is half a step more than the held one.
+    #[test]
+    fn sampled_inputs_go_on_a_line() {
+        let input = Signal::from_shape_fn((100, 1), |(k, _)| 0.1 * k as f64);
+        let drive = Drive::new(0.1, input).unwrap();
+        let last = |sampled| {
+            let conditions = Conditions {
+                sampled,
+                ..Conditions::declared()
+            };
+            let system = System::new(&[0.7], &conditions);
+            let run = run(&decay(0.0).into(), system, &drive, draws(Noise::OFF));
+            run.unwrap().outputs[[99, 0]]
+        };
+        // ẋ = −kx + u answers a constant 0.05 by 0.05/k.
+        let more = last(true) - last(false);
+        assert!((more - 0.05 / 0.7).abs() < 1e-3, "{more}");
     }
 
     #[test]

@@ -7,7 +7,8 @@ mod black_box;
 mod conditions;
 mod equations;
 
-pub(super) use conditions::{Conditions, Feedback, NuisanceKind};
+pub use conditions::NuisanceKind;
+pub(super) use conditions::{Conditions, Feedback};
 
 use super::law::Departure;
 use crate::record::{Drive, Signal};
@@ -57,6 +58,15 @@ impl RecordNoise {
     pub fn remeasured(self) -> Self {
         Self {
             measurement: self.measurement.child("again"),
+            ..self
+        }
+    }
+
+    /// Draws of what went before the record.
+    fn earlier(self) -> Self {
+        Self {
+            process: self.process.child("earlier"),
+            measurement: self.measurement.child("earlier"),
             ..self
         }
     }

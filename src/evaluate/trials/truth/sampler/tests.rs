@@ -31,7 +31,7 @@ fn rooms_of(samples: usize) -> Study {
 }
 
 fn sampler(study: &Study) -> TruthSampler<'_> {
-    TruthSampler::new(study, Families::All, None).unwrap()
+    TruthSampler::new(study, (Families::All, vec![]), None).unwrap()
 }
 
 fn draw(sampler: &TruthSampler<'_>, kind: Kind, trial: usize) -> Drawn {
@@ -215,10 +215,17 @@ fn black_boxes_have_departures_of_signals_and_parameters() {
     let study = study.unwrap();
     let sampler = sampler(&study);
     assert!(sampler.is_silent && equations(sampler.study.twin()).is_none());
-    for kind in [Kind::None, Kind::Listed, Kind::Random] {
+    for kind in [Kind::None, Kind::Listed, Kind::Random, Kind::Memory] {
         let drawn = sampler.draw(0, kind, Extra::default(), Noise::new(2, "box", 0));
         let truth = drawn.unwrap().truth;
         assert_eq!(truth.departures.is_empty(), kind == Kind::None);
+        let is_of_memory =
+            |label: &String| label.starts_with("hysteretic") || label.starts_with("memory");
+        assert!(
+            kind != Kind::Memory || truth.labels.iter().all(is_of_memory),
+            "{:?}",
+            truth.labels
+        );
         assert_eq!(truth.conditions.added.len(), 1);
     }
 }
@@ -237,7 +244,7 @@ fn records_are_like_a_measured_one() {
         outputs.slice(ndarray::s![..150, ..]).to_owned(),
     );
     let like = like.unwrap();
-    let sampler = TruthSampler::new(&study, Families::Closed, Some(&like)).unwrap();
+    let sampler = TruthSampler::new(&study, (Families::Closed, vec![]), Some(&like)).unwrap();
     let noise = Noise::new(9, "like", 0);
     let made = sampler
         .draw(0, Kind::Listed, Extra::default(), noise)
