@@ -13,6 +13,7 @@ use crate::estimator::settings::Settings;
 use crate::feature::FeatureRecipe;
 use crate::math::one_row;
 use crate::network::{Architecture, NamedTensor, bytes_of, values_of};
+use crate::setting::count;
 use crate::storage::checksum::sha256;
 use crate::storage::files::{replace, write_new};
 use crate::storage::untrusted::{message, read};
@@ -201,7 +202,7 @@ fn restored(bytes: &[u8], path: &Path, known: &[Project]) -> Result<Estimator, S
     let map = header.features.bind(project.study().twin());
     let width = map.map_err(|error| error.to_string())?.dim();
     if width != n {
-        let reason = format!("{width} features, the network reads {n}");
+        let reason = format!("{}, the network reads {n}", count(width, "feature"));
         return Err(not_whole(&reason));
     }
     let row = |name: &str, width: usize| {
@@ -322,7 +323,9 @@ fn architecture(header: &Header, project: &Project) -> Result<Arc<dyn Architectu
     match outputs == names {
         true => Ok(architecture),
         false => Err(not_whole(&format!(
-            "{outputs} outputs for {names} parameters"
+            "{} for {}",
+            count(outputs, "output"),
+            count(names, "parameter")
         ))),
     }
 }

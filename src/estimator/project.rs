@@ -5,6 +5,7 @@ use crate::feature::{Ar, Arx, FeatureError, FeatureRecipe, Score};
 use crate::likelihood::likelihood_of;
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
 use crate::record::Drive;
+use crate::setting::count;
 use crate::study::{Study, StudyError, StudyFile};
 use crate::twin::Noise;
 use crate::twin::conformance::{Finding, Severity};
@@ -147,7 +148,10 @@ impl Project {
             Err(error) => (Severity::Failure, error),
             Ok(x) => match recipe.check_width(x.len()) {
                 Err(problem) => (Severity::Failure, problem),
-                Ok(()) => (Severity::Pass, format!("{} features of a record", x.len())),
+                Ok(()) => (
+                    Severity::Pass,
+                    format!("{} of a record", count(x.len(), "feature")),
+                ),
             },
         };
         Ok(Finding {
@@ -210,7 +214,8 @@ impl Recipe {
         match features <= most {
             true => Ok(()),
             false => Err(format!(
-                "{features} features, network \"{id}\" takes at most {most}; lower their order"
+                "{}, network \"{id}\" takes at most {most}; lower their order",
+                count(features, "feature")
             )),
         }
     }

@@ -23,7 +23,7 @@ pub use score::Score;
 use crate::likelihood::kalman::FilterError;
 use crate::math::MathError;
 use crate::record::{Drive, RecordError, Signal};
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::twin::{SimulationError, Twin};
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -131,7 +131,8 @@ pub enum FeatureError {
     Record(#[from] RecordError),
     /// Fewer samples than the features need.
     #[error(
-        "the record has {samples} samples, these features need {needed}; take a longer record, or features that need fewer"
+        "the record has {}, these features need {needed}; take a longer record, or features that need fewer",
+        count(*samples, "sample")
     )]
     TooShort {
         /// Samples of the record.

@@ -5,6 +5,7 @@ use super::model::{self, ModelOf, MultiHeadModel};
 use super::train::Course;
 use super::{Checkpoints, HeadArchitecture, History, NamedTensor, NetworkError, Training};
 use crate::progress::Progress;
+use crate::setting::count;
 use dfdx::prelude::ConstDim;
 use ndarray::Array2;
 use std::fmt::{self, Debug};
@@ -99,8 +100,9 @@ impl<A: HeadArchitecture> Typed<A> {
     fn build(inputs: usize, outputs: usize, seed: u64) -> Result<MultiHead<A>, NetworkError> {
         if inputs > A::Features::SIZE {
             return Err(NetworkError::Data(format!(
-                "{inputs} features, but architecture `{}` takes at most {}; \
+                "{}, but architecture `{}` takes at most {}; \
                  use fewer features or an architecture with larger `Features`",
+                count(inputs, "feature"),
                 A::ID,
                 A::Features::SIZE
             )));

@@ -401,7 +401,7 @@ mod tests {
         let text = refused("t,u,y1,y4\n0,1,2,3\n1,1,2,3\n");
         assert!(text.contains("column \"y4\""), "{text}");
         let text = refused("t,u,y\n0,1,2\n1,1,2\n");
-        assert!(text.contains("1 outputs, the twin has 3"), "{text}");
+        assert!(text.contains("1 output, the twin has 3"), "{text}");
     }
 
     #[test]

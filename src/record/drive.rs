@@ -3,6 +3,7 @@
 use super::channels::LARGEST;
 use crate::math::three_digits;
 use crate::record::{Quantity, RecordError};
+use crate::setting::count;
 use ndarray::{Array2, s};
 use std::sync::Arc;
 
@@ -312,7 +313,9 @@ fn check_rows(times: usize, inputs: &Signal) -> Result<(), RecordError> {
     match inputs.nrows() {
         rows if rows == times => Ok(()),
         rows => Err(RecordError::Lengths(format!(
-            "{times} times and {rows} rows of inputs"
+            "{} and {} of inputs",
+            count(times, "time"),
+            count(rows, "row")
         ))),
     }
 }

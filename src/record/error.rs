@@ -1,7 +1,7 @@
 //! Errors of drives, records and their files.
 
 use super::channels::LARGEST;
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::storage::files::with_remedy;
 use crate::storage::untrusted::excerpt;
 use std::path::{Path, PathBuf};
@@ -126,10 +126,11 @@ pub enum RecordError {
     },
     /// Channels other than the twin's.
     #[error(
-        "the record has {given} {kind}, the twin has {expected}{names}; {twin}: choose the twin that this record is of, or correct the columns"
+        "the record has {}, the twin has {expected}{names}; {twin}: choose the twin that this record is of, or correct the columns",
+        count(*given, kind)
     )]
     Channels {
-        /// "inputs" or "outputs".
+        /// "input" or "output".
         kind: &'static str,
         /// In the record.
         given: usize,

@@ -4,6 +4,7 @@ use super::channels::{column_names, columns, names_in_brackets};
 use super::drive::{check_sizes, check_values, signal};
 use crate::math::six_digits;
 use crate::record::{Drive, Quantity, RecordError, Signal, Signals, step_of};
+use crate::setting::count;
 use ndarray::{ArrayView2, s};
 use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
@@ -33,9 +34,9 @@ impl Record {
     pub fn new(drive: Drive, outputs: Signal) -> Result<Self, RecordError> {
         if outputs.nrows() != drive.samples() {
             return Err(RecordError::Lengths(format!(
-                "{} rows of inputs and {} rows of outputs",
-                drive.samples(),
-                outputs.nrows()
+                "{} of inputs and {} of outputs",
+                count(drive.samples(), "row"),
+                count(outputs.nrows(), "row")
             )));
         }
         if outputs.ncols() == 0 {
@@ -213,8 +214,8 @@ impl Record {
         let (inputs, outputs) = (signals.inputs.len(), signals.outputs.len());
         let own = (self.drive.inputs().ncols(), self.outputs.ncols());
         let (kind, letter, given, expected) = match own {
-            (given, _) if given != inputs => ("inputs", "u", given, inputs),
-            (_, given) if given != outputs => ("outputs", "y", given, outputs),
+            (given, _) if given != inputs => ("input", "u", given, inputs),
+            (_, given) if given != outputs => ("output", "y", given, outputs),
             _ => {
                 check_sizes(self.drive.inputs(), "input", &signals.inputs)?;
                 return check_sizes(&self.outputs, "output", &signals.outputs);

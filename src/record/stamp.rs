@@ -21,7 +21,8 @@ impl Stamp {
     /// a nanosecond are cut off.
     pub fn parse(text: &str) -> Option<Self> {
         // Without its signs a date is a number.
-        if text.get(4..5) != Some("-") || !has_zone_of_a_clock(text) {
+        let is_date = text.get(4..5) == Some("-");
+        if !is_date || !has_zone_of_a_clock(text) || has_leap_second(text) {
             return None;
         }
         let text = without_surplus_digits(text);
@@ -68,6 +69,12 @@ fn has_zone_of_a_clock(text: &str) -> bool {
         // The sign before a day.
         false => digits.chars().all(|c| c.is_ascii_digit()),
     }
+}
+
+/// Returns `true` for a second 60, which the parser takes for 59: two rows would have one time.
+fn has_leap_second(text: &str) -> bool {
+    let time = text.chars().skip(DATE.len() + 1).filter(|c| *c != ':');
+    time.skip(4).take(2).eq("60".chars())
 }
 
 /// Cuts the fraction of a second to nanoseconds, which the parser asks for.
@@ -141,6 +148,8 @@ mod tests {
             "2024-01-01T12:00-24:00",
             "2024-01-01T12:00:00+26:00",
             "20240101",
+            "2016-12-31T23:59:60Z",
+            "2016-12-31 23:59:60.5",
             "2024-01-01Z",
             "01.03.2024 12:00",
             "2024-1-1",

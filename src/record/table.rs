@@ -6,7 +6,7 @@ use super::drive::FileRows;
 use super::stamp::Stamp;
 use super::text::{Decimals, Text, separator_name};
 use crate::record::{Drive, LARGEST, Record, RecordError, Signal};
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt, quoted};
 use std::path::Path;
 
@@ -144,7 +144,10 @@ impl Table {
         }
         let rows = t.len();
         if rows < 2 {
-            let problem = format!("{rows} rows of data; at least 2 are needed to know the step");
+            let problem = format!(
+                "{} of data; at least 2 are needed to know the step",
+                count(rows, "row")
+            );
             return Err(RecordError::file(path, problem));
         }
         let signal = |width: usize, values: Vec<f64>| {
@@ -294,7 +297,8 @@ fn csv_error(path: &Path, separator: u8, row: usize, error: csv::Error) -> Recor
                 ""
             };
             format!(
-                "row {row} has {len} cells, the header has {expected_len}, separated by {}{comma}",
+                "row {row} has {}, the header has {expected_len}, separated by {}{comma}",
+                count(len as usize, "cell"),
                 separator_name(separator)
             )
         }
@@ -370,8 +374,8 @@ fn channels(all: &[ColumnName<'_>], signals: Option<&Signals>) -> Result<(usize,
 /// Says which channels a file has more of than the twin.
 fn too_many(all: &[ColumnName<'_>], signals: &Signals) -> Option<String> {
     let sides = [
-        ("u", "inputs", &signals.inputs),
-        ("y", "outputs", &signals.outputs),
+        ("u", "input", &signals.inputs),
+        ("y", "output", &signals.outputs),
     ];
     sides.into_iter().find_map(|(letter, kind, channels)| {
         let of_file = all.iter().filter(|(usual, _)| usual.starts_with(letter));
@@ -379,8 +383,8 @@ fn too_many(all: &[ColumnName<'_>], signals: &Signals) -> Option<String> {
         let expected = channels.len();
         (of_file.len() > expected).then(|| {
             format!(
-                "the record has {} {kind} ({}), the twin has {expected}{}; choose the twin that this record is of, or correct the columns",
-                of_file.len(),
+                "the record has {} ({}), the twin has {expected}{}; choose the twin that this record is of, or correct the columns",
+                count(of_file.len(), kind),
                 excerpt(&of_file.join(",")),
                 names_in_brackets(letter, expected)
             )

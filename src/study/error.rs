@@ -4,7 +4,7 @@ use crate::equations::EquationsError;
 use crate::likelihood::kalman::FilterError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
-use crate::setting::{SettingError, did_you_mean, number};
+use crate::setting::{SettingError, count, did_you_mean, number};
 use crate::storage::files::with_remedy;
 use crate::twin::{SimulationError, TwinError};
 use std::path::PathBuf;
@@ -95,7 +95,7 @@ pub enum StudyError {
     #[error("{0}")]
     Plan(String),
     /// A twin with inputs whose simulated records have none.
-    #[error("the twin has {0} inputs; give simulated records levels or a file as input")]
+    #[error("the twin has {}; give simulated records levels or a file as input", count(*.0, "input"))]
     NoInput(usize),
     /// A record with another step than the study's.
     #[error(
@@ -143,7 +143,7 @@ pub enum StudyError {
         expected: f64,
     },
     /// A record is too short for a diagnosis.
-    #[error("{} has {samples} samples; at least {least} are needed, measure longer", name(*record))]
+    #[error("{} has {}; at least {least} are needed, measure longer", name(*record), count(*samples, "sample"))]
     TooShort {
         /// Index among the measured records, from 0; none for the validation record.
         record: Option<usize>,

@@ -4,7 +4,7 @@ use crate::effect::{EffectEntry, line_of_effect};
 use crate::equations::{self, Equations};
 use crate::feature::FeatureRecipe;
 use crate::record::UNIFORM;
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::storage::files::folder;
 use crate::storage::untrusted::{all_keyed, check_names, line, message, read_text};
 use crate::study::error::StudyError;
@@ -128,9 +128,10 @@ impl StudyFile {
                 || record.samples.is_some_and(|n| n != samples);
             if other {
                 return Err(StudyError::Plan(format!(
-                    "{}: step or samples contradict {}, which has {samples} samples, step {} s; leave them out",
+                    "{}: step or samples contradict {}, which has {}, step {} s; leave them out",
                     path.display(),
                     input.display(),
+                    count(samples, "sample"),
                     number(step)
                 )));
             }

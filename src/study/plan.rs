@@ -5,7 +5,7 @@ use crate::record::{
     Drive, MOST_SAMPLES, Quantity, Record, RecordError, RecordReader, Signal, Signals, UNIFORM,
     column_names,
 };
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::storage::untrusted::MOST_NUMBERS;
 use crate::study::error::StudyError;
 use crate::study::input_plan::{InputPlan, PlannedInputs};
@@ -221,8 +221,9 @@ impl RecordPlan {
         let (step, samples) = (drive.dt(), drive.samples());
         if (step - self.step).abs() > UNIFORM * self.step || samples != self.samples {
             return Err(StudyError::Plan(format!(
-                "{}: {samples} samples, step {} s; simulated records have {}, step {} s: resample the file, or plan records of its step and length",
+                "{}: {}, step {} s; simulated records have {}, step {} s: resample the file, or plan records of its step and length",
                 path.display(),
+                count(samples, "sample"),
                 number(step),
                 self.samples,
                 number(self.step)
@@ -251,8 +252,9 @@ fn read(path: &Path, channels: usize) -> Result<Drive, StudyError> {
     match drive.inputs().ncols() {
         given if given == channels => Ok(drive),
         given => Err(StudyError::Plan(format!(
-            "{}: {given} inputs, the twin has {channels}; give each its column",
-            path.display()
+            "{}: {}, the twin has {channels}; give each its column",
+            path.display(),
+            count(given, "input")
         ))),
     }
 }
@@ -291,8 +293,9 @@ pub(super) fn grid_of_files(
         let (first, other, length) = *grid.get_or_insert((path, step, samples));
         if (step - other).abs() > UNIFORM * other || samples != length {
             return Err(StudyError::Plan(format!(
-                "{}: {samples} samples, step {} s, and {} has {length}, step {} s; inputs of one record have one step and length: resample or cut one",
+                "{}: {}, step {} s, and {} has {length}, step {} s; inputs of one record have one step and length: resample or cut one",
                 path.display(),
+                count(samples, "sample"),
                 number(step),
                 first.display(),
                 number(other)
@@ -497,7 +500,7 @@ mod tests {
     #[test]
     fn what_is_missing_is_named() {
         let error = RecordPlan::autonomous(0.5, 9).prepare(&Signals::default());
-        assert!(error.unwrap_err().to_string().contains("1 inputs"));
+        assert!(error.unwrap_err().to_string().contains("1 input;"));
         let plan = RecordPlan::levels(0.5, 9, 0.0, 1.0, 0);
         assert!(matches!(
             plan.prepare(&Signals::default()),

@@ -1,6 +1,6 @@
 //! Errors of a twin's parameters, names, settings and effects, and of its simulations.
 
-use crate::setting::{did_you_mean, number};
+use crate::setting::{count, did_you_mean, number};
 use std::path::PathBuf;
 
 /// A fault in a twin, its parameters, a point, a new setting, or an effect on it.
@@ -27,7 +27,7 @@ pub enum TwinError {
         problem: String,
     },
     /// A point with too many or too few numbers.
-    #[error("{given} values for {expected} parameters ({names}); give one value for each")]
+    #[error("{} for {} ({names}); give one value for each", count(*given, "value"), count(*expected, "parameter"))]
     Length {
         /// Values given.
         given: usize,

@@ -143,11 +143,17 @@ impl Parameter {
 
     /// Checks that a value lies within the bounds.
     pub(crate) fn check_value(&self, value: f64) -> Result<(), TwinError> {
+        let (low, high) = (self.bounds.low(), self.bounds.high());
         if self.bounds.contains(value) {
             return Ok(());
         }
+        // What rounds to an end is told by its distance.
+        let by = match [low, high].map(number).contains(&number(value)) {
+            true => format!(" by {}", number((value - high).max(low - value))),
+            false => String::new(),
+        };
         Err(TwinError::Declaration(format!(
-            "{} = {} is outside its bounds {}; choose a value inside",
+            "{} = {} is outside its bounds {}{by}; choose a value inside",
             self.name,
             number(value),
             self.bounds
@@ -384,6 +390,17 @@ mod tests {
         let space = ParameterSpace::new([Parameter::new("k", "-", 0.0, 2.0).within(0.5, 3.0)]);
         let error = space.check().unwrap_err().to_string();
         assert!(error.contains("leaves its bounds [0.5, 3]"), "{error}");
+    }
+
+    #[test]
+    fn a_value_that_rounds_to_its_bound_is_told_by_its_distance() {
+        let told = |value: f64| pair()[0].check_value(value).unwrap_err().to_string();
+        assert!(told(12.0).contains("a = 12 is outside its bounds [0, 9];"));
+        assert!(
+            told(9.0 + 1e-9).contains("outside its bounds [0, 9] by 1.000000"),
+            "{}",
+            told(9.0 + 1e-9)
+        );
     }
 
     #[test]

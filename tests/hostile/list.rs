@@ -66,10 +66,10 @@ fn odd_record_files_are_named_as_such() {
     let kinds = format!("t,y\n0,1\n{stamp},2\n");
     let cases: [(&[u8], &[&str]); 24] = [
         (b"", &["the file is empty"]),
-        (b"t,u,y\n0,1,2\n", &["1 rows of data", "at least 2"]),
+        (b"t,u,y\n0,1,2\n", &["1 row of data", "at least 2"]),
         (
             b"t;u;y\n0,1,2\n",
-            &["row 2 has 1 cells", "separated by semicolons"],
+            &["row 2 has 1 cell", "separated by semicolons"],
         ),
         (
             b"t\tu\ty\n0\t1\t2\t3\n",
@@ -103,7 +103,7 @@ fn odd_record_files_are_named_as_such() {
         (b"t,y\n01.03.2024,1\n", &["row 2, column t", "ISO 8601"]),
         (b"t,y\n0,1,5\n", &["row 2 has 3 cells", "decimal points"]),
         (b"t,y\n0,\"1,5\"\n", &["row 2, column y", "decimal comma"]),
-        (&utf16, &["1 rows of data"]),
+        (&utf16, &["1 row of data"]),
         (b"t\0,\0y\0", &["UTF-16", "UTF-8"]),
         (b"t,u,y,y\n0,1,2,3\n", &["\"y\" appears twice", "t,u,y1,y2"]),
         (b"t,t,y\n0,0,2\n", &["t appears twice"]),

@@ -375,7 +375,7 @@ fn records_of_another_step_or_channels_are_refused_with_the_remedy() {
     let error = other(Drive::autonomous(0.05, 300).unwrap(), 2);
     assert!(error.contains("2 outputs, the twin has 1 (y)"), "{error}");
     let error = other(Drive::new(0.05, Signal::zeros((300, 1))).unwrap(), 1);
-    assert!(error.contains("1 inputs, the twin has 0"), "{error}");
+    assert!(error.contains("1 input, the twin has 0"), "{error}");
     let error = other(Drive::autonomous(0.05, 7).unwrap(), 1);
     assert!(error.contains("7 samples"), "{error}");
 }

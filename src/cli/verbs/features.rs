@@ -2,6 +2,7 @@
 
 use crate::cli::prelude::*;
 use crate::estimator::bank::file;
+use crate::setting::count;
 use ndarray::Array2;
 
 /// Compress records to the features that the network sees.
@@ -54,7 +55,7 @@ impl Verb for Features {
             None => file::features_csv_text(&features).map_err(Failure::internal)?,
             Some(out) => {
                 let (rows, n) = features.dim();
-                format!("{}: {rows} × {n} features", out.display())
+                format!("{}: {rows} × {}", out.display(), count(n, "feature"))
             }
         };
         context.print(&json, || text)

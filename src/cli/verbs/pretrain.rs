@@ -5,6 +5,7 @@ use crate::cli::prelude::*;
 use crate::estimator::bank::{Bank, file};
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::estimator::{EstimatorError, PretrainOptions, Pretraining, Project};
+use crate::setting::count;
 use crate::storage::work::checksum;
 use std::time::{Duration, Instant};
 
@@ -77,12 +78,13 @@ impl Verb for Pretrain {
         });
         Provenance::new(context).print_beside(context, json, || {
             format!(
-                "{}: estimator of {} from {bank} simulations, {} features, {} epochs, loss {loss:.4}, {seconds:.1} s\n\
+                "{}: estimator of {} from {}, {}, {}, loss {loss:.4}, {seconds:.1} s\n\
                  next: truetwin estimate RECORD.csv --estimator {}",
                 self.out.display(),
                 study.twin().parameters().names().join(", "),
-                estimator.network().inputs(),
-                history.epochs_run,
+                count(bank, "simulation"),
+                count(estimator.network().inputs(), "feature"),
+                count(history.epochs_run, "epoch"),
                 self.out.display(),
             )
         })

@@ -3,7 +3,7 @@
 use crate::cli::prelude::*;
 use crate::effect::{Effect, augment};
 use crate::record::{Drive, Record, twin_csv_text};
-use crate::setting::{did_you_mean, number};
+use crate::setting::{count, did_you_mean};
 use crate::twin::{Noise, Parameter, ParameterSpace, Role, Twin};
 use std::collections::BTreeMap;
 
@@ -105,8 +105,9 @@ impl Simulate {
             return twin.check_drive(drive).in_file(path);
         }
         Err(Failure::user(format!(
-            "{}: {given} inputs, the twin has {expected}; give t and one column for each input",
-            path.display()
+            "{}: {}, the twin has {expected}; give t and one column for each input",
+            path.display(),
+            count(given, "input")
         )))
     }
 }
@@ -152,13 +153,10 @@ fn complete(
         )));
     }
     let value = |p: &Parameter| match (given.get(&p.name), magnitudes.get(&p.name), p.role) {
-        (Some(value), _, _) if p.bounds.contains(*value) => Ok(*value),
-        (Some(value), _, _) => Err(wrong_theta(format!(
-            ": {} = {} is outside its bounds {}; choose a value inside",
-            p.name,
-            number(*value),
-            p.bounds
-        ))),
+        (Some(value), _, _) => match p.check_value(*value) {
+            Ok(()) => Ok(*value),
+            Err(error) => Err(wrong_theta(format!(": {error}"))),
+        },
         // The effect has checked its limits; off values may be infinite.
         (None, Some(magnitude), _) => Ok(*magnitude),
         (None, None, Role::Start | Role::Noise) => Ok(p.prior.centre()),

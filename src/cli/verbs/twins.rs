@@ -3,6 +3,7 @@
 use crate::cli::prelude::*;
 use crate::estimator::Project;
 use crate::record::Quantity;
+use crate::setting::count;
 use clap::ValueEnum;
 
 /// List the twins: parameters, units, prior, bounds, channels.
@@ -51,7 +52,7 @@ fn in_words(study: &Study) -> String {
     let states = twin.outline().map(|outline| names(&outline.states));
     let record = study
         .plan()
-        .map(|p| format!("{} samples, step {} s", p.samples, p.step));
+        .map(|p| format!("{}, step {} s", count(p.samples, "sample"), p.step));
     let mut text = format!(
         "{}\n  states  {}\n  inputs  {}\n  outputs {}\n  record  {}\n  {:<12} {:<8} {:<16} bounds\n",
         study.name(),

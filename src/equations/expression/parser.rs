@@ -2,7 +2,7 @@
 
 use super::lexer::{Problem, Token, tokens};
 use super::operation::{Binary, Callable, FUNCTIONS, Unary};
-use crate::setting::{did_you_mean, number};
+use crate::setting::{count, did_you_mean, number};
 
 /// Longest expression, in bytes: some thousand operations.
 const LONGEST: usize = 20_000;
@@ -244,7 +244,8 @@ impl<'t> Parser<'t> {
                 usize::MAX => format!("{least} or more"),
                 _ => least.to_string(),
             };
-            return Err((at, format!("{name} has {given} numbers; it takes {needed}")));
+            let given = count(given, "number");
+            return Err((at, format!("{name} has {given}; it takes {needed}")));
         }
         match function {
             Callable::One(operation) => self.items.push(Item::One(operation)),
@@ -332,7 +333,7 @@ mod tests {
             ("(1 + 2", 6, "an operation or )"),
             ("1 2", 2, "unexpected 2"),
             ("sine(1)", 0, "did you mean \"sin\"?"),
-            ("1 + atan2(1)", 4, "atan2 has 1 numbers; it takes 2"),
+            ("1 + atan2(1)", 4, "atan2 has 1 number; it takes 2"),
             ("min(1)", 0, "2 or more"),
             ("sin + 1", 0, "write sin("),
             ("1 < 2 < 3", 6, "second comparison"),

@@ -11,6 +11,7 @@ use super::Draws;
 pub(crate) use super::npy::archive;
 use super::npy::{self, Npz};
 use crate::estimator::error::EstimatorError;
+use crate::setting::count;
 use crate::storage::files::write_new;
 use crate::storage::reading::{Reading, note_whole, open};
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt};
@@ -96,12 +97,12 @@ pub fn read(path: &Path, space: &ParameterSpace) -> Result<Draws, EstimatorError
 pub(crate) fn check(draws: &Draws, parameters: usize) -> Result<(), String> {
     let (theta, features) = (&draws.theta, &draws.features);
     if theta.ncols() != parameters {
-        let given = theta.ncols();
-        return Err(format!("{given} parameters, the twin has {parameters}"));
+        let given = count(theta.ncols(), "parameter");
+        return Err(format!("{given}, the twin has {parameters}"));
     }
     if theta.nrows() != features.nrows() {
-        let (rows, of) = (theta.nrows(), features.nrows());
-        return Err(format!("{rows} rows of theta, {of} of features"));
+        let (rows, of) = (count(theta.nrows(), "row"), features.nrows());
+        return Err(format!("{rows} of theta, {of} of features"));
     }
     for (what, matrix) in [("theta", theta), ("features", features)] {
         if let Some(((row, column), value)) = matrix.indexed_iter().find(|(_, v)| !v.is_finite()) {
@@ -190,7 +191,10 @@ fn told(error: &csv::Error, line: usize) -> String {
     match error.kind() {
         csv::ErrorKind::UnequalLengths {
             len, expected_len, ..
-        } => format!("row {line}: {len} cells, the header has {expected_len}"),
+        } => {
+            let cells = count(*len as usize, "cell");
+            format!("row {line}: {cells}, the header has {expected_len}")
+        }
         _ => error.to_string(),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::description::Description;
 use crate::record::{Drive, Signal, Signals};
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::storage::untrusted::{Keyed, excerpt, message};
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -208,7 +208,9 @@ fn stack(
         if values.len() != samples {
             let given = values.len();
             return Err(format!(
-                "output {name} has {given} values, {samples} samples were asked for; give one number a sample"
+                "output {name} has {}, for {}; give one number a sample",
+                count(given, "value"),
+                count(samples, "sample")
             ));
         }
         for (k, (to, value)) in column.iter_mut().zip(values).enumerate() {

@@ -407,7 +407,7 @@ fn what_does_not_fit_is_named() {
         .and_then(|k| k.log_likelihood(&[1.0]))
         .unwrap_err();
     assert!(
-        short.to_string().contains("1 values for 2 parameters"),
+        short.to_string().contains("1 value for 2 parameters"),
         "{short}"
     );
     let other = Chain::new(2);
@@ -415,7 +415,7 @@ fn what_does_not_fit_is_named() {
         .and_then(|k| k.log_likelihood(&theta))
         .unwrap_err();
     assert!(
-        error.to_string().contains("1 outputs, the twin has 2"),
+        error.to_string().contains("1 output, the twin has 2"),
         "{error}"
     );
     let error = Kalman::new(twin.clone(), &fitting, &settings)

@@ -3,7 +3,7 @@
 use super::Composed;
 use super::parts::Theta;
 use crate::record::{Drive, Signal};
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::twin::integrator::{Bends, Between, remove_amounts};
 use crate::twin::{Hold, Interval, Noise, Now, Outline, SimulationError, Workspace};
 use std::borrow::Cow;
@@ -29,7 +29,8 @@ pub(super) fn check_lengths(
     let (given, inputs) = (drive.inputs().ncols(), outline.inputs.len());
     if given != inputs {
         return Err(SimulationError::fatal(format!(
-            "the drive has {given} inputs, the twin has {inputs}"
+            "the drive has {}, the twin has {inputs}",
+            count(given, "input")
         )));
     }
     Ok(())

@@ -304,6 +304,11 @@ impl Setting<'_> {
             return warned(TOO_LARGE);
         };
         let largest = svd.values.max();
+        if largest == 0.0 {
+            return warned(
+                "the free run is the same for every θ: only noise can tell; take longer records or another input",
+            );
+        }
         // Standard deviation of the direction if the noise were white, in prior widths.
         let deviation = |s: f64| spread / 2f64.sqrt() / s;
         let named = |weak: &dyn Fn(f64) -> bool| -> Vec<String> {

@@ -110,7 +110,7 @@ fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
     };
     let tanks = tanks_record();
     refuses(&["none.csv"], &["none.csv"]);
-    refuses(&[&tanks], &["of-tanks.csv: the record has 1 inputs"]);
+    refuses(&[&tanks], &["of-tanks.csv: the record has 1 input"]);
     refuses(
         &[&record, "--without", "cubic"],
         &["unknown effect cubic", "truetwin effects"],
@@ -142,7 +142,7 @@ fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
     let other = [&record, "--validation", &tanks];
     refuses(
         &other,
-        &["of-tanks.csv: the record has 1 inputs, the twin has 0"],
+        &["of-tanks.csv: the record has 1 input, the twin has 0"],
     );
     let slow = oscillation("slow.csv", 300, 0.1);
     let remedy = "step of 0.1 s, the first record 0.05 s; resample it";

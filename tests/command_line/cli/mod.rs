@@ -293,7 +293,7 @@ fn wrong_records_are_named_by_file_row_column_value_and_remedy() {
     );
     estimate(
         &file("driven.csv", "t,u,y\n0,1,1\n0.05,1,2\n"),
-        &["driven.csv", "1 inputs, the twin has 0"],
+        &["driven.csv", "1 input, the twin has 0"],
     );
     estimate(&at("nowhere.csv"), &["nowhere.csv", "No such file"]);
     estimate(&file("binary.csv", "\u{0}\u{1}PNG"), &["binary.csv"]);

@@ -19,7 +19,7 @@ fn told(arguments: &[&str], parts: &[&str]) {
 fn a_record_of_another_twin_is_named_as_such() {
     let tanks = file("of-tanks-1.csv", "t,u,y\n0,1,1\n0.5,2,2\n1,1,3\n");
     let parts = [
-        "of-tanks-1.csv: the record has 1 inputs, the twin has 0",
+        "of-tanks-1.csv: the record has 1 input, the twin has 0",
         "van-der-pol takes the columns t,y",
         "choose the twin that this record is of",
     ];

@@ -289,11 +289,11 @@ fn a_record_is_checked_against_a_twin() {
     assert_eq!(value["suits"], false);
     let other = done(&["check", &record, "--twin", "van-der-pol"]);
     assert!(
-        other.contains("failure   channels") && other.contains("1 inputs, the twin has 0"),
+        other.contains("failure   channels") && other.contains("1 input, the twin has 0"),
         "{other}"
     );
     let one = place.write("one.csv", "t,u,y\n0,1,2\n");
-    refused(&["check", &one, "--twin", "tanks"], &["1 rows of data"]);
+    refused(&["check", &one, "--twin", "tanks"], &["1 row of data"]);
     refused(&["check", &record], &["no twin given"]);
 }
 

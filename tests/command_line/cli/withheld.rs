@@ -131,7 +131,7 @@ fn trials_can_be_like_a_measured_record() {
     refused(
         &[&other[..], &["--out", &format!("{out}-2")]].concat(),
         &[
-            "r.csv: the record has 1 inputs",
+            "r.csv: the record has 1 input",
             "van-der-pol takes the columns t,y",
         ],
     );

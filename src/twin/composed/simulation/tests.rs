@@ -57,7 +57,7 @@ fn divergence_tells_the_time_and_wrong_lengths_are_fatal() {
     ));
     let driven = Drive::new(0.1, Signal::zeros((3, 1))).unwrap();
     let error = Walk.simulate(&[0.0], &driven, Noise::OFF).unwrap_err();
-    assert!(error.to_string().contains("1 inputs, the twin has 0"));
+    assert!(error.to_string().contains("1 input, the twin has 0"));
 }
 
 #[test]
