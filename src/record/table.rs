@@ -123,9 +123,8 @@ impl Table {
             }
             *read += width;
             if *read > MOST_NUMBERS {
-                return Err(large(format!(
-                    "more than {MOST_NUMBERS} numbers in all records together"
-                )));
+                let problem = format!("more than {MOST_NUMBERS} numbers in all records together");
+                return Err(large(problem));
             }
             let number = reader.line();
             let lines = number.saturating_sub(t.len() + 2);
@@ -144,10 +143,8 @@ impl Table {
         }
         let rows = t.len();
         if rows < 2 {
-            let problem = format!(
-                "{} of data; at least 2 are needed to know the step",
-                count(rows, "row")
-            );
+            let given = count(rows, "row");
+            let problem = format!("{given} of data; at least 2 are needed to know the step");
             return Err(RecordError::file(path, problem));
         }
         let signal = |width: usize, values: Vec<f64>| {

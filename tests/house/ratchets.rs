@@ -278,10 +278,10 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     let files = sources.sources.values();
     let files = files.map(|source| source.file.display().to_string());
     vec![
-        Ratchet::new("public items", 163, items.collect()),
+        Ratchet::new("public items", 164, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 62_614, lines),
-        Ratchet::new("files", 495, files.collect()),
+        Ratchet::new("lines of code", 62_812, lines),
+        Ratchet::new("files", 496, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 13, methods_of_state_space(sources)),
         Ratchet::new("named numeric constants", 258, constants(sources)),

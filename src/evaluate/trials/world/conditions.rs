@@ -164,7 +164,7 @@ impl Conditions {
         self.added.get(j).copied().unwrap_or(0.0)
     }
 
-    /// What inputs do from sample to sample.
+    /// Rules of inputs between samples, from those of the twin.
     pub(super) fn holds(&self, twin: &[Hold]) -> Vec<Hold> {
         let own = |hold: &Hold| match (hold, self.sampled) {
             (Hold::Zero, true) => Hold::Linear,

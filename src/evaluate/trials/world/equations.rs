@@ -75,16 +75,7 @@ pub(super) fn run(
             signal.row_mut(k).assign(&ArrayView1::from(row));
         }
         twin.update(&now, &mut x);
-        // The next sample's inputs, towards which these go where the twin says so.
-        let next: Vec<f64> = match k + 1 < samples {
-            true => {
-                let (from, to) = (drive.input(k), drive.input(k + 1));
-                (u.iter().zip(from.iter().zip(to)))
-                    .map(|(u, (from, to))| u + to - from)
-                    .collect()
-            }
-            false => u.clone(),
-        };
+        let next = next_inputs(drive, k, &u);
         let between = Between {
             next: &next,
             holds: &holds,
@@ -110,6 +101,16 @@ pub(super) fn run(
         states,
         rates,
     })
+}
+
+/// Inputs u of sample k at the next one, towards which they go where the twin says so.
+fn next_inputs(drive: &Drive, k: usize, u: &[f64]) -> Vec<f64> {
+    if k + 1 == drive.samples() {
+        return u.to_vec();
+    }
+    let steps = drive.input(k).iter().zip(drive.input(k + 1));
+    let ends = u.iter().zip(steps);
+    ends.map(|(u, (from, to))| u + to - from).collect()
 }
 
 /// The last state of a run that ends a sample before the record.
@@ -413,7 +414,7 @@ mod tests {
         assert!((0.085..0.115).contains(&share), "{share}");
     }
 
-    /// Of u = t behind a sample, the mean over the step is half a step more than the held one.
+    /// Between samples u = t is half a step more, on the mean, than its held value.
     #[test]
     fn sampled_inputs_go_on_a_line() {
         let input = Signal::from_shape_fn((100, 1), |(k, _)| 0.1 * k as f64);
