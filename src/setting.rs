@@ -12,17 +12,12 @@
 
 use std::fmt::Display;
 
-/// Writes a number for a message: whole, or to eight digits; with an exponent where it is very large or small, and that is shorter.
+/// Writes a number for a message, to eight digits; with an exponent where it is very large or small.
 pub(crate) fn number(value: f64) -> String {
-    let rounded = format!("{value:.7e}").parse().unwrap_or(value);
-    let is_whole = value.fract() == 0.0 && value.abs() < 1e12;
-    let value = if is_whole { value } else { rounded };
+    let value = format!("{value:.7e}").parse().unwrap_or(value);
     let (plain, exponent) = (value.to_string(), format!("{value:e}"));
-    let is_usual = value == 0.0 || !value.is_finite() || (1e-5..1e9).contains(&value.abs());
-    match is_usual || is_whole && plain.len() < exponent.len() {
-        true => plain,
-        false => exponent,
-    }
+    let is_usual = value == 0.0 || !value.is_finite() || (1e-5..1e8).contains(&value.abs());
+    if is_usual { plain } else { exponent }
 }
 
 /// So many of what is named in the singular: `1 input`, `2 inputs`.
@@ -139,7 +134,9 @@ mod tests {
             (-2.5, "-2.5"),
             (366e5, "36600000"),
             (2e9, "2e9"),
-            (2_147_483_648.0, "2147483648"),
+            (2_147_483_648.0, "2.1474836e9"),
+            (5e8, "5e8"),
+            (123_456_789.123, "1.2345679e8"),
             (1e308, "1e308"),
             (-5e-312, "-5e-312"),
             (f64::NAN, "NaN"),

@@ -125,7 +125,7 @@ impl Remedy for StorageError {
             | Self::OtherVersion { .. }
             | Self::Busy(_) => "choose another --out".into(),
             Self::Foreign { verb, .. } => format!("`truetwin {verb}` makes them"),
-            Self::Threads { .. } => "--threads N takes fewer".into(),
+            Self::Threads { threads, .. } if *threads > 1 => "--threads N takes fewer".into(),
             Self::NoMpi(_) => {
                 "`cargo install --features mpi`, or --shard i/n in a job array".into()
             }

@@ -215,7 +215,7 @@ impl<'a, 't> TableEntry<'a, 't> {
         self.source.error(
             value.span().start,
             format!(
-                "{key} of {} is something else; write {expected}",
+                "{key} of {} cannot be read; write {expected}",
                 excerpt(self.name)
             ),
         )

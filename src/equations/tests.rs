@@ -181,7 +181,7 @@ fn faults_are_one_line_with_their_place() {
         ),
         (
             "[states]\nh = { rate = true }\n",
-            "rate of h is something else; write a number or an expression",
+            "rate of h cannot be read; write a number or an expression",
         ),
         (
             "[states]\nh = { rate = \"1\" }\n[record]\nintegrator = \"stif\"\n",
@@ -193,7 +193,7 @@ fn faults_are_one_line_with_their_place() {
         ),
         (
             "[states]\nh = { rate = \"1\" }\n[inputs]\nu = { hold = \"pulse\" }\n",
-            "hold of u is something else",
+            "hold of u cannot be read",
         ),
         (
             "[states]\nh = { rate = \"a < b < 1\" }\n",

@@ -3,11 +3,12 @@
 use super::MathError;
 use statrs::distribution::{Beta, ContinuousCDF};
 
-/// Standard deviation of a sample, over its size.
+/// Standard deviation of a sample of values of any size, over its number.
 pub(crate) fn deviation(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+    let (n, unit) = (values.len().max(1) as f64, unit(largest(values)));
+    let mean = values.iter().map(|v| v / unit).sum::<f64>() / n;
+    let squares = values.iter().map(|v| (v / unit - mean).powi(2));
+    (squares.sum::<f64>() / n).sqrt() * unit
 }
 
 /// The power of two at or below a size: squares of values divided by it neither overflow nor vanish, and no bit of them is lost. 1 for

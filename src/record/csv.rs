@@ -414,7 +414,7 @@ mod tests {
         let one = written("t,y1,y2\n0,1,\n1,1,\n2,1,nan\n").unwrap();
         assert!(one.has_output(0) && !one.has_output(1));
         let text = message("t,y\n0,\n1,1\n2,\n");
-        assert!(text.contains("1 rows with a measured output"), "{text}");
+        assert!(text.contains("1 row with a measured output"), "{text}");
     }
 
     #[test]

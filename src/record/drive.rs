@@ -345,16 +345,26 @@ pub(crate) fn check_sizes(
 ) -> Result<(), RecordError> {
     for (channel, values) in signal.columns().into_iter().enumerate() {
         let size = values.fold(0.0, |a: f64, v| a.max(v.abs()));
-        if size > LARGEST || (size > 0.0 && size < 1.0 / LARGEST) {
-            let name = quantities.get(channel).map(|own| own.name.clone());
-            return Err(RecordError::Size {
-                kind,
-                name: name.unwrap_or_else(|| (channel + 1).to_string()),
-                size: three_digits(size),
-            });
-        }
+        let name = quantities.get(channel).map(|own| own.name.clone());
+        check_size(
+            kind,
+            &name.unwrap_or_else(|| (channel + 1).to_string()),
+            size,
+        )?;
     }
     Ok(())
+}
+
+/// Checks that a signal of this size can be computed with.
+pub(crate) fn check_size(kind: &'static str, name: &str, size: f64) -> Result<(), RecordError> {
+    match size.is_finite() && size > LARGEST || size > 0.0 && size < 1.0 / LARGEST {
+        true => Err(RecordError::Size {
+            kind,
+            name: name.into(),
+            size: three_digits(size),
+        }),
+        false => Ok(()),
+    }
 }
 
 /// A signal of one slice a channel.

@@ -93,7 +93,7 @@ pub enum RecordError {
     #[error("{0}")]
     Resample(String),
     /// Too few rows with an output.
-    #[error("{0} rows with a measured output; at least 2 are needed")]
+    #[error("{} with a measured output; at least 2 are needed", count(*.0, "row"))]
     TooFewValues(usize),
     /// No output channel.
     #[error("the record has no output; give at least one column y")]
@@ -117,9 +117,9 @@ pub enum RecordError {
         1.0 / LARGEST
     )]
     Size {
-        /// "input" or "output".
+        /// "input", "output" or "state".
         kind: &'static str,
-        /// Channel.
+        /// Channel or state.
         name: String,
         /// Its largest absolute value.
         size: f64,

@@ -309,6 +309,6 @@ mod tests {
         );
         assert!(one.first_part(2).is_some() && some.first_part(2).is_none());
         let few = message([1.0, 2.0, nan, nan, nan, nan]);
-        assert!(few.starts_with("1 rows with a measured output;"), "{few}");
+        assert!(few.starts_with("1 row with a measured output;"), "{few}");
     }
 }

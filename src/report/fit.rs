@@ -9,7 +9,7 @@ use super::record::overlay_svg;
 use super::residuals::{Left, residual_blocks};
 use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Profile, depth};
 use crate::record::Record;
-use crate::setting::{own_unit, unit_suffix};
+use crate::setting::{count, own_unit, unit_suffix};
 use crate::study::Study;
 use crate::twin::{Parameter, ParameterSpace};
 use serde_json::{Value, json};
@@ -302,8 +302,8 @@ pub(super) fn draws(study: &Study, posterior: &Posterior) -> Section {
         }
     };
     let brief = Block::Paragraph(format!(
-        "{} posterior draws, worth {:.0} independent ones.{several}",
-        posterior.values.nrows(),
+        "{}, worth {:.0} independent.{several}",
+        count(posterior.values.nrows(), "posterior draw"),
         posterior.effective
     ));
     let caption = "Each dot is a draw of the posterior: a system that the record allows.";

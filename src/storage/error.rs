@@ -1,5 +1,6 @@
 //! The error of files and work folders.
 
+use crate::setting::count;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -121,7 +122,9 @@ pub enum StorageError {
     Share(String),
     /// Threads that the system refuses to start.
     #[error(
-        "cannot start {threads} threads ({error}); choose fewer, or raise the limits of memory and processes (ulimit -v, ulimit -u)"
+        "cannot start {} ({error}); {}raise the limits of memory and processes (ulimit -v, ulimit -u)",
+        count(*threads, "thread"),
+        if *threads > 1 { "choose fewer, or " } else { "" }
     )]
     Threads {
         /// Number of threads asked for.
@@ -187,6 +190,10 @@ pub(crate) fn with_remedy(error: &io::Error) -> String {
             "raise the limit of file sizes (ulimit -f), or choose another place"
         }
         io::ErrorKind::FileTooLarge => "check that it is the file that you mean",
+        // Too many open files, of the system or of the process.
+        _ if matches!(error.raw_os_error(), Some(23 | 24)) => {
+            "raise the limit of open files (ulimit -n)"
+        }
         _ => "check the path and the disk",
     };
     format!("{error}; {remedy}")

@@ -120,10 +120,11 @@ impl PlannedInputs {
     pub fn check(&self, inputs: &[Quantity]) -> Result<(), String> {
         let plans = match self {
             Self::Alike { hold: 0, .. } => {
-                return Err("hold = 0; a level is held for at least 1 sample".into());
+                return Err("input: hold = 0; a level is held for at least 1 sample".into());
             }
             Self::Alike { levels, .. } if !levels.is_finite() => {
-                return Err(wrong_ends(&[levels.low(), levels.high()]));
+                let problem = wrong_ends(&[levels.low(), levels.high()]);
+                return Err(format!("input: {problem}"));
             }
             Self::Alike { .. } | Self::File(_) => return Ok(()),
             Self::Each(plans) => plans,

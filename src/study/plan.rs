@@ -2,8 +2,8 @@
 
 use crate::math::{ends, six_digits};
 use crate::record::{
-    Drive, MOST_SAMPLES, Quantity, Record, RecordError, RecordReader, Signal, Signals, UNIFORM,
-    column_names,
+    Drive, LARGEST, MOST_SAMPLES, Quantity, Record, RecordError, RecordReader, Signal, Signals,
+    UNIFORM, column_names,
 };
 use crate::setting::{count, number};
 use crate::storage::untrusted::MOST_NUMBERS;
@@ -113,6 +113,12 @@ impl RecordPlan {
         } else if samples.saturating_mul(all) > MOST_NUMBERS {
             Some(format!(
                 "samples = {samples} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record"
+            ))
+        } else if self.step * samples as f64 > LARGEST {
+            Some(format!(
+                "step = {}; a record of {} ends beyond {LARGEST:e} s: take a smaller step",
+                number(self.step),
+                count(samples, "sample")
             ))
         } else if self.input.is_some() && channels == 0 {
             Some("input is given, but the twin has none; remove it".into())

@@ -183,6 +183,9 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
             DeValue::Table(inner) if inner.is_empty() && name == "input" => {
                 "has no plan; give a number, a file, or { levels = [low, high], hold = n }"
             }
+            DeValue::Table(inner) if inner.is_empty() && name == "record" && key == "input" => {
+                "has no plan; give { levels = [low, high], hold = n } or a file, or remove it if the twin has no input"
+            }
             DeValue::Table(inner) if inner.is_empty() && name != "features" => {
                 "is empty; remove it"
             }

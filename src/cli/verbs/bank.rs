@@ -2,6 +2,7 @@
 
 use crate::cli::prelude::*;
 use crate::estimator::shards::BankPlan;
+use crate::setting::count;
 use crate::storage::work::Share;
 use std::time::Instant;
 
@@ -79,8 +80,11 @@ impl Verb for Bank {
                 false => "other jobs make the other shards; merge their folders with truetwin merge".into(),
             };
             format!(
-                "{folder}: {} of {} shards, {} of {} simulations; {made} new in {seconds:.1} s ({rate:.0} per second)\n{next}",
-                filled.there, filled.of, filled.rows, self.size,
+                "{folder}: {} of {}, {} of {}; {made} new in {seconds:.1} s ({rate:.0} per second)\n{next}",
+                filled.there,
+                count(filled.of, "shard"),
+                filled.rows,
+                count(self.size, "simulation"),
             )
         })
     }

@@ -44,7 +44,12 @@ impl Verb for Merge {
         let json = json!({
             "schema": "truetwin.merge/1", "out": output::name(&self.out), "what": what, "count": count,
         });
-        let text = || format!("{out}: {count} {what}");
+        let text = || {
+            format!(
+                "{out}: {}",
+                crate::setting::count(count, what.trim_end_matches('s'))
+            )
+        };
         Provenance::new(context).print_beside(context, json, text)
     }
 }

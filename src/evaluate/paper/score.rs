@@ -123,7 +123,7 @@ pub fn score(study: &Study, plan: &MonteCarlo, runs: &[BenchmarkRun]) -> Scores 
                     .collect()
             };
             let squares = errors(&|theta, truth| {
-                let squares = theta.iter().zip(truth).map(|(a, b)| (a - b).powi(2));
+                let squares = theta.iter().zip(truth).map(|(a, b)| square(a - b));
                 squares.sum::<f64>() / truth.len() as f64
             });
             let ranked: Vec<f64> = (squares.iter())
@@ -142,7 +142,7 @@ pub fn score(study: &Study, plan: &MonteCarlo, runs: &[BenchmarkRun]) -> Scores 
                 failed: squares.iter().filter(|e| e.is_nan()).count(),
                 invariants: (invariants.iter())
                     .map(|(name, of)| {
-                        let squares = errors(&|theta, truth| (of(theta) - of(truth)).powi(2));
+                        let squares = errors(&|theta, truth| square(of(theta) - of(truth)));
                         (*name, mean(&squares))
                     })
                     .collect(),
@@ -182,7 +182,7 @@ fn heads(runs: &[BenchmarkRun]) -> Option<HeadScore> {
             .collect()
     };
     let squares = all.iter().map(|(c, run)| {
-        let squares = c.theta.iter().zip(&run.truth).map(|(a, b)| (a - b).powi(2));
+        let squares = c.theta.iter().zip(&run.truth).map(|(a, b)| square(a - b));
         squares.sum::<f64>() / run.truth.len() as f64
     });
     Some(HeadScore {
@@ -213,7 +213,7 @@ fn points(space: &ParameterSpace, runs: &[BenchmarkRun]) -> Vec<PointScore> {
             };
             let rmse = |j: usize| {
                 let squares = (own.iter())
-                    .map(|run| fine(run).map_or(f64::NAN, |found| (found[j] - theta[j]).powi(2)));
+                    .map(|run| fine(run).map_or(f64::NAN, |found| square(found[j] - theta[j])));
                 mean(&squares.collect::<Vec<_>>()).sqrt()
             };
             let names = space.names().into_iter().enumerate();
@@ -246,6 +246,14 @@ fn covered<'r>(name: &str, j: usize, runs: impl IntoIterator<Item = &'r Benchmar
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The square of an error; NaN where a number cannot hold it.
+fn square(error: f64) -> f64 {
+    match error * error {
+        square if square.is_normal() || error == 0.0 => square,
+        _ => f64::NAN,
+    }
 }
 
 /// Standard deviation over √n; NaN for fewer than two values.

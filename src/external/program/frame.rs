@@ -3,6 +3,7 @@
 use super::asking::Reply;
 use super::inside::ServedMethod;
 use super::protocol::{check_id, error_text};
+use crate::setting::count;
 use crate::storage::untrusted::{Keyed, message};
 use crate::twin::Now;
 use serde::Deserialize;
@@ -128,7 +129,9 @@ pub(super) fn reply(
     match (told.bytes, told.error) {
         (Some(bytes), None) if bytes == expected => Ok(Reply::Good((), bytes)),
         (Some(bytes), None) => Err(format!(
-            "bytes = {bytes}, {rows} rows of {points} numbers are {expected} bytes; give all of them"
+            "bytes = {bytes}, {} of {} are {expected}; give all of them",
+            count(rows, "row"),
+            count(points, "number")
         )),
         (None, Some(text)) => error_text(&text).map(Reply::Error),
         _ => Err("exactly one of bytes and error is needed; leave the other out".into()),

@@ -97,7 +97,8 @@ pub(in crate::fit) fn table(
         values: Array2::from_shape_fn(shape, |(i, j)| rows[i][j]),
         names,
         modes: draws.modes.iter().map(|mode| mode + 1).collect(),
-        effective: draws.effective,
+        // Rows that are drawn from many proposals are worth themselves at most.
+        effective: draws.effective.min(shape.0 as f64),
     })
 }
 

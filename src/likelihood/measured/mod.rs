@@ -24,7 +24,7 @@ pub(crate) use start::with_better_start;
 
 use super::ensemble;
 use super::kalman::FilterError;
-use crate::record::Record;
+use crate::record::{Record, check_size};
 use crate::twin::{Composed, ParameterSpace, Role, Twin, TwinError, TwinPart, fix};
 use level::{RecordSizes, build};
 use motion::{declared_levels, followed_motion, free_motion, size};
@@ -134,6 +134,9 @@ fn measured_equations(
             .collect()
     };
     let motion = free_motion(base, records, &theta, fallback);
+    for (state, &size) in outline.states.iter().zip(&motion) {
+        check_size("state", &state.name, size)?;
+    }
     let mut sizes = RecordSizes {
         starts: widths(&motion),
         states: motion,

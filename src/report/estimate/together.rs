@@ -98,7 +98,12 @@ pub(crate) fn together_document(study: &Study, all: &Together, files: &[String])
         title: format!("{}: {} records", study.name(), all.records.len()),
         answer: vec![
             Block::Headline(format!(
-                "The records {word} (χ² = {q}, {n} degrees of freedom, {p}){why}."
+                "The records {word} (χ² = {q}, {} of freedom, {p}){why}.",
+                if n == 1 {
+                    "1 degree".into()
+                } else {
+                    format!("{n} degrees")
+                }
             )),
             values("", INTERVAL_LEVEL, &rows(study, all)),
             Block::paragraph("Each record is estimated, the answers weighed by their precision."),

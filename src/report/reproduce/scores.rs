@@ -5,6 +5,7 @@ use crate::evaluate::LEVEL;
 use crate::evaluate::paper::{Coverage, MethodScore, MonteCarlo, Scenario, Scores};
 use crate::report::digits::short;
 use crate::report::document::{Block, Column, Document};
+use crate::setting::count;
 use crate::study::Study;
 use serde_json::{Value, json};
 
@@ -24,16 +25,12 @@ pub fn reproduce_text(
         Scenario::Grid => "grid (fixed θ in and out of the prior)",
     };
     let (name, runs, seed) = (study.name(), plan.runs, plan.seed);
-    let title = format!("{name}, scenario {theta}, {runs} runs, preset {preset}, seed {seed}");
+    let runs = count(runs, "run");
+    let title = format!("{name}, scenario {theta}, {runs}, preset {preset}, seed {seed}");
     let names = study.twin().parameters();
     let names = names.names();
-    let failures = (scores.methods.iter().filter(|s| s.failed > 0)).map(|s| {
-        format!(
-            "{}: no answer on {} of {runs} runs",
-            s.method.label(),
-            s.failed
-        )
-    });
+    let failures = (scores.methods.iter().filter(|s| s.failed > 0))
+        .map(|s| format!("{}: no answer on {} of {runs}", s.method.label(), s.failed));
     let tables = [
         Some(errors(&title, scores)),
         invariants(scores),

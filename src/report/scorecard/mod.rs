@@ -5,6 +5,7 @@ mod tables;
 use crate::evaluate::LEVEL;
 use crate::evaluate::trials::{Breakdown, BreakdownLine, Scorecard, TrialRow};
 use crate::report::document::{Block, Document, Matrix, Section, Shade};
+use crate::setting::count;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use tables::{breakdown, delivered_svg, of, reliability_svg};
@@ -113,8 +114,12 @@ fn setup(card: &Scorecard) -> String {
         false => format!(", diagnosed without {}", parts.join(", ")),
     };
     format!(
-        "{}: {} withheld trials, seed {}, families {}{without}. Truths were sealed before the first diagnosis: sha256 of the key file {}",
-        setup.twin, card.trials, settings.seed, settings.families, setup.seal
+        "{}: {}, seed {}, families {}{without}. Truths were sealed before the first diagnosis: sha256 of the key file {}",
+        setup.twin,
+        count(card.trials, "withheld trial"),
+        settings.seed,
+        settings.families,
+        setup.seal
     )
 }
 

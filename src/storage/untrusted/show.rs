@@ -11,8 +11,8 @@ const MESSAGE: usize = 2000;
 /// Words of parsers, and those of their readers.
 const WORDS: [(&str, &str); 19] = [
     (
-        "as i128, expected any valid TOML value",
-        "has too many digits",
+        " as i128, expected any valid TOML value",
+        ", which has too many digits",
     ),
     ("invalid type: map", "found a table"),
     ("invalid type: sequence", "found a list"),

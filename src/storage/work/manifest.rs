@@ -126,7 +126,7 @@ impl Manifest {
         let longest = old.chars().count().max(new.chars().count());
         Some(excerpt(&match longest <= SHORT {
             true => format!("{key} was {old}, now it is {new}"),
-            false => format!("{key} differs"),
+            false => format!("other {key}"),
         }))
     }
 }
@@ -165,7 +165,7 @@ mod tests {
         );
         assert_eq!(differs(manifest()), "network was deep, now it is not given");
         let long = there.clone().with("network", "x".repeat(50));
-        assert_eq!(differs(long), "network differs");
+        assert_eq!(differs(long), "other network");
     }
 
     #[test]

@@ -25,7 +25,7 @@ use crate::likelihood::{measured, time_constants};
 use crate::math::three_digits;
 use crate::progress::Progress;
 use crate::record::{Drive, Quantity, Record, Signal};
-use crate::setting::{count, number};
+use crate::setting::{count, number, unit_suffix};
 use crate::twin::Noise;
 use crate::twin::conformance::{Finding, Severity};
 use limits::LIMITS;
@@ -76,14 +76,17 @@ impl Study {
         let record = begin.unwrap_or_else(|| record.clone());
         let stage = progress.stage("runs", LIMITS.draws as usize + 4);
         // A plan without inputs is no fault of the record.
-        let planned = (self.drives().ok()).and_then(|drives| drives.draw(noise).ok());
-        let planned = planned.and_then(|drive| self.planned(drive, noise));
+        let drives = self.drives().ok();
+        let drawn = |noise| drives.as_ref()?.draw(noise).ok();
+        let planned = drawn(noise).and_then(|drive| self.planned(drive, noise));
         let planned_drive = planned.as_ref().map(Record::drive);
         stage.tick()?;
         let constants = planned.as_ref().and_then(|r| self.time_constants(r));
         let (found, unit) = time::check(self, &record, constants);
         findings.extend(found);
-        let (found, factors) = size::check_inputs(self, &record, planned_drive);
+        let plans = (0..LIMITS.draws).filter_map(|draw| drawn(noise.child("plan").sample(draw)));
+        let plans: Vec<Drive> = plans.map(|plan| plan.first(record.samples())).collect();
+        let (found, factors) = size::check_inputs(self, &record, planned_drive, &plans);
         findings.extend(found);
         // Further checks are not to repeat what is known: they see the record in the right units.
         let record = size::with_inputs_divided(time::in_seconds(record, unit)?, &factors)?;
@@ -190,10 +193,7 @@ fn text(value: f64) -> String {
 
 /// A number to three digits with its unit.
 fn with_unit(value: f64, unit: &str) -> String {
-    match unit {
-        "" | "-" => text(value),
-        unit => format!("{} {unit}", text(value)),
-    }
+    text(value) + &unit_suffix(unit)
 }
 
 /// Values of a channel that are not missing, with their samples.
