@@ -307,7 +307,7 @@ mod tests {
         assert!(message("t,y1,y3\n0,1,1\n1,1,1\n").contains("\"y3\""));
         assert!(message("t,y1,y1\n0,1,1\n1,1,1\n").contains("twice"));
         assert!(message("t,y\n0,1\n1\n2,2\n").contains("row 3"));
-        assert!(message("t,y\n0,1\n").contains("1 rows"));
+        assert!(message("t,y\n0,1\n").contains("1 row of data"));
     }
 
     /// Columns have the names of the file; where there are more than channels, numbers are not to blame.

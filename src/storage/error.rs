@@ -198,3 +198,26 @@ pub(crate) fn with_remedy(error: &io::Error) -> String {
     };
     format!("{error}; {remedy}")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_of_the_system_have_remedies_that_work() {
+        let many = with_remedy(&io::Error::from_raw_os_error(24));
+        assert!(
+            many.ends_with("raise the limit of open files (ulimit -n)"),
+            "{many}"
+        );
+        let [one, two] = [1, 2].map(|n| StorageError::threads(n, "no").to_string());
+        assert!(
+            one.starts_with("cannot start 1 thread (no); raise the"),
+            "{one}"
+        );
+        assert!(
+            two.contains("2 threads (no); choose fewer, or raise"),
+            "{two}"
+        );
+    }
+}

@@ -411,6 +411,10 @@ mod tests {
                 "twin = 'x'\n[record.input]\nu1 = {}\n",
                 "s.toml, line 3: [record] input u1 has no plan",
             ),
+            (
+                "twin = 'x'\n[record]\ninput = {}\n",
+                "s.toml, line 3: [record] input has no plan",
+            ),
             ("twin = 'x'\n[record]\nsubsteps = 1e9\n", "s.toml, line 3"),
             ("twin = 'x'\n[record]\nsubsteps = -1\n", "s.toml, line 3"),
             ("twin = 'x'\n[noise]\ny = 'guess'\n", "s.toml, line 3"),

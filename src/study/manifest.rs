@@ -130,6 +130,6 @@ mod tests {
             study.manifest("bank", 1).unwrap()
         };
         let difference = manifest(1.0).differs(&manifest(2.0)).unwrap();
-        assert!(difference.starts_with("input files"), "{difference}");
+        assert!(difference.starts_with("other input files"), "{difference}");
     }
 }

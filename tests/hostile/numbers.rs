@@ -107,7 +107,7 @@ fn lag(parameter: f64, output: f64) -> String {
 fn parameters_of_any_size_are_estimated_alike() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
-    let mut answers = vec![];
+    let (mut answers, mut fits) = (vec![], vec![]);
     for size in [1.0, 1e160, 1e-160, 1e300, 1e-290] {
         let name = |ending: &str| format!("{size:e}.{ending}");
         fs::write(at.join(name("toml")), lag(size, 1.0)).unwrap();
@@ -130,6 +130,15 @@ fn parameters_of_any_size_are_estimated_alike() {
         assert!(output.status.success(), "{size:e}: {}", told(&output));
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
+        let output = run(at, &["fit", &record, study[0], study[1], "--json"]);
+        assert!(output.status.success(), "{size:e}: {}", told(&output));
+        let fit: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let fitted = &fit["parameters"][0];
+        fits.push([
+            number(&fitted["value"]) / size,
+            number(&fitted["std_error"]) / size,
+            number(&fitted["prior_share"]),
+        ]);
         answers.push([
             number(&json["theta"]["final"][0]) / size,
             number(&json["std_error"][0]) / size,
@@ -137,6 +146,13 @@ fn parameters_of_any_size_are_estimated_alike() {
             number(&json["gate"]["p_value"]),
             number(&json["after"]["p_value"]),
         ]);
+    }
+    for fit in &fits {
+        let pairs = fit.iter().zip(&fits[0]);
+        assert!(
+            { pairs }.all(|(own, first)| (own / first - 1.0).abs() < 1e-6),
+            "{fits:?}"
+        );
     }
     let [value, ..] = answers[0];
     assert!((value - 1.0).abs() < 0.1, "{answers:?}");
@@ -185,6 +201,33 @@ fn outputs_of_such_a_size_ask_for_another_unit() {
             assert!(unit || largest, "{words}: {said}");
         }
         assert!(!at.join("e.est").exists());
+    }
+}
+
+/// States are no outputs that a record shows, and have squares, too.
+#[test]
+fn states_of_such_a_size_ask_for_another_unit() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    for size in [1e170, 1e-170] {
+        let study = format!(
+            "[parameters]\na = {{ prior = [0.5, 2.0], bounds = [0.1, 9.0] }}\n[states]\nx = {{ rate = \"a*({size:e}*u - x)\", noise = {:e} }}\n\
+             [inputs]\nu = {{}}\n[outputs]\ny = {{ value = \"x/{size:e}\", noise = 0.05 }}\n[record]\nstep = 0.2\nsamples = 60\n\
+             input = {{ levels = [0, 1], hold = 10 }}\n",
+            0.01 * size
+        );
+        fs::write(at.join("s.toml"), study).unwrap();
+        let made = "simulate --study s.toml --theta a=1.3 --out r.csv";
+        let output = run(at, &made.split(' ').collect::<Vec<_>>());
+        assert!(output.status.success(), "{}", told(&output));
+        for verb in ["fit", "diagnose"] {
+            let output = run(at, &[verb, "r.csv", "--study", "s.toml"]);
+            assert_eq!(output.status.code(), Some(2), "{output:?}");
+            let said = told(&output);
+            let parts = ["state x is", "choose a unit"];
+            assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+        }
+        fs::remove_file(at.join("r.csv")).unwrap();
     }
 }
 

@@ -119,6 +119,22 @@ fn what_a_twin_does_at_some_points_of_its_prior_is_no_damage() {
     assert!(wrong.len() <= 2, "{wrong:#?}");
 }
 
+/// Of few levels, all may be small: short records of the plan itself have no wrong unit.
+#[test]
+fn short_records_have_small_inputs() {
+    let mut wrong = vec![];
+    for (samples, hold) in [(16, 30), (40, 20), (60, 20)] {
+        let plan = RecordPlan::levels(0.5, samples, 0.0, 3.0, hold);
+        let study = Study::new("short", BothTanks, plan).unwrap();
+        for seed in 0..30 {
+            let found = warnings(&study, &record(&study, seed, |u| u)).into_iter();
+            wrong.extend(found.filter(|(check, _)| ["scale", "inputs"].contains(check)));
+        }
+    }
+    // One level in 63 lies below two fifths of the least of 24.
+    assert!(wrong.len() <= 2, "{wrong:#?}");
+}
+
 /// Twelve ways to spoil a record, each with the check that names it.
 #[test]
 fn spoilt_records_are_named() {

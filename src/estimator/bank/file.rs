@@ -358,7 +358,7 @@ mod tests {
             features: array![[1.0]],
             redrawn: 0,
         };
-        assert!(refused("wide.npz", &npz(&wide).unwrap()).contains("1 parameters"));
+        assert!(refused("wide.npz", &npz(&wide).unwrap()).contains("1 parameter,"));
         let short = Draws {
             features: array![[1.0]],
             ..draws()

@@ -206,10 +206,7 @@ mod tests {
         let error = reply(r#"{"id": 4, "error": "no\nlicence"}"#, 4, (2, 5));
         assert!(matches!(error, Ok(Reply::Error(text)) if text == "no licence"));
         for (line, part) in [
-            (
-                r#"{"id": 4, "bytes": 72}"#,
-                "2 rows of 5 numbers are 80 bytes",
-            ),
+            (r#"{"id": 4, "bytes": 72}"#, "2 rows of 5 numbers are 80;"),
             (r#"{"id": 3, "bytes": 80}"#, "id 3, the request has 4"),
             (r#"{"id": 4}"#, "exactly one of"),
             (r#"{"id": 4, "bytse": 80}"#, "unknown key `bytse`"),

@@ -341,7 +341,7 @@ mod tests {
             ),
             (
                 r#"{"id": 7, "outputs": {"y": [1, 2]}}"#,
-                "2 values, 3 samples",
+                "2 values, for 3 samples",
             ),
             (r#"{"id": 7, "outputs": {}}"#, "outputs lack y"),
             (

@@ -1,8 +1,8 @@
 //! The kind of noise that the records of a fit ask for.
 
 use super::model::Model;
-use super::{Before, Breadth, listed};
 use crate::effect::{TargetKind, targets};
+use crate::fit::climb::climb;
 use crate::fit::{Searched, fits};
 use crate::hypothesis::limits::SEARCH;
 use crate::hypothesis::noise::proportional;
@@ -10,6 +10,7 @@ use crate::hypothesis::shared;
 use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::Measured;
 use crate::likelihood::kalman::FilterError;
+use crate::parallel::try_found;
 use crate::twin::Noise;
 use std::sync::Arc;
 
@@ -40,22 +41,13 @@ pub(crate) fn with_asked_noise(
     let Some(mut model) = Model::bare(measured.twin.clone(), problem, best, false) else {
         return Ok(searched);
     };
-    let breadth = Breadth::of(&model, false).of_all();
     loop {
-        let mut promising = vec![];
-        for term in terms {
-            if promised(&model, &term)? >= SEARCH.noise_promise {
-                promising.push(term);
-            }
-        }
-        terms = promising;
-        if terms.is_empty() {
-            break;
-        }
-        let found = listed(&model, &terms, Before::default(), breadth)?;
+        let fits = try_found(&terms, |term| fitted_with(&model, term))?;
+        terms = fits.iter().map(|(term, _)| term.clone()).collect();
         let least = model.log_evidence + SEARCH.asked_noise;
-        let likelier = found.into_iter().filter(|e| e.log_z > least);
-        let Some(better) = likelier.filter_map(|e| e.model).next() else {
+        let likelier = fits.into_iter().filter_map(|(_, fitted)| fitted);
+        let likelier = likelier.filter(|fitted| fitted.log_evidence > least);
+        let Some(better) = likelier.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
             break;
         };
         let is_other = |part: &Part| match (part, better.terms.last().map(|term| &term.part)) {
@@ -75,14 +67,18 @@ pub(crate) fn with_asked_noise(
     })
 }
 
-/// Nats that a little of a term promises beside a model, θ free to answer: what the slopes of both gain over those of θ alone.
-fn promised(model: &Model, term: &Arc<Term>) -> Result<f64, FilterError> {
+/// A term that promises enough beside a model, with its fit; `None` where it does not. The promise is what the slopes of the term and of θ gain over
+/// those of θ alone, from a little of the term.
+fn fitted_with(
+    model: &Model,
+    term: &Arc<Term>,
+) -> Result<Option<(Arc<Term>, Option<Model>)>, FilterError> {
     let extended = model.extend(term)?;
     let own = extended.entries[0];
-    let step = extended.problem.axes[own].small_size();
-    let theta = model.beside(&extended, &[step.unwrap_or_default()]);
+    let little = extended.problem.axes[own].small_size().unwrap_or_default();
+    let theta = model.beside(&extended, &[little]);
     let Some(at) = extended.at(&theta)? else {
-        return Ok(0.0);
+        return Ok(None);
     };
     let c = &extended.problem.coordinates;
     let free = |j: &usize| !extended.problem.axes[*j].held;
@@ -95,11 +91,19 @@ fn promised(model: &Model, term: &Arc<Term>) -> Result<f64, FilterError> {
         let step = factor.solve(&gradient);
         Some((0.5 * gradient.dot(&step), step))
     };
+    let mut phi = c.of(&theta);
     // Without slopes, a fit alone can tell.
-    let Some(((with, step), (without, _))) = newton(&all).zip(newton(&others)) else {
-        return Ok(f64::INFINITY);
-    };
-    let moved = (all.iter().zip(step.iter())).find(|(j, _)| **j == own);
-    let leaves = moved.is_some_and(|(_, step)| c.of(&theta)[own] + step < c.lower()[own]);
-    Ok(if leaves { 0.0 } else { with - without })
+    if let Some(((with, step), (without, _))) = newton(&all).zip(newton(&others)) {
+        all.iter().zip(&step).for_each(|(&j, step)| phi[j] += step);
+        if phi[own] < c.lower()[own] || with - without < SEARCH.noise_promise {
+            return Ok(None);
+        }
+    }
+    let ends = c.lower().iter().zip(c.upper());
+    let start: Vec<f64> = (phi.iter().zip(ends))
+        .map(|(phi, (low, high))| phi.max(*low).min(*high))
+        .collect();
+    let fitted = climb(&extended.problem, &c.theta(&start), SEARCH.to_the_end)?;
+    let fitted = fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted));
+    Ok(Some((term.clone(), fitted)))
 }

@@ -215,7 +215,7 @@ fn estimators_that_ask_for_more_than_they_hold() {
     let mut greedy = whole.clone();
     greedy[outputs + 12] = b'9';
     let message = refused(MIB, || readers::estimator(&greedy));
-    assert!(message.contains("9 outputs for 1 parameters"), "{message}");
+    assert!(message.contains("9 outputs for 1 parameter"), "{message}");
     let mut huge = whole;
     huge[..8].copy_from_slice(&(u64::MAX / 2).to_le_bytes());
     refused(MIB, || readers::estimator(&huge));
