@@ -54,7 +54,7 @@ fn a_record_is_read_bit_for_bit_and_checked_as_csv_is() {
     );
     write(&path, &[0.0, 0.5, 1.0], &[1.0, f64::INFINITY, 2.0]);
     assert!(
-        refused().contains("row 2, column y: \"inf\""),
+        refused().contains("row 3, column y: \"inf\""),
         "{}",
         refused()
     );
