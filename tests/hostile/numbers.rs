@@ -225,7 +225,11 @@ fn states_of_such_a_size_ask_for_another_unit() {
             assert_eq!(output.status.code(), Some(2), "{output:?}");
             let said = told(&output);
             // What is too large diverges before it has a size.
-            let part = if size < 1.0 { "state x is" } else { "check units" };
+            let part = if size < 1.0 {
+                "state x is"
+            } else {
+                "check units"
+            };
             assert!(said.contains(part), "{said}");
         }
         fs::remove_file(at.join("r.csv")).unwrap();

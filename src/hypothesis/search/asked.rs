@@ -43,10 +43,10 @@ pub(crate) fn with_asked_noise(
     };
     loop {
         let fits = try_found(&terms, |term| fitted_with(&model, term))?;
-        terms = fits.iter().map(|(term, _)| term.clone()).collect();
+        let last = fits.iter().filter_map(|fitted| fitted.terms.last());
+        terms = last.cloned().collect();
         let least = model.log_evidence + SEARCH.asked_noise;
-        let likelier = fits.into_iter().filter_map(|(_, fitted)| fitted);
-        let likelier = likelier.filter(|fitted| fitted.log_evidence > least);
+        let likelier = fits.into_iter().filter(|f| f.log_evidence > least);
         let Some(better) = likelier.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
             break;
         };
@@ -67,12 +67,9 @@ pub(crate) fn with_asked_noise(
     })
 }
 
-/// A term that promises enough beside a model, with its fit; `None` where it does not. The promise is what the slopes of the term and of θ gain over
-/// those of θ alone, from a little of the term.
-fn fitted_with(
-    model: &Model,
-    term: &Arc<Term>,
-) -> Result<Option<(Arc<Term>, Option<Model>)>, FilterError> {
+/// Fit of a model with a term that promises enough; `None` where it does not. The promise is what the slopes of the term and of θ gain over those of θ
+/// alone, from a little of the term.
+fn fitted_with(model: &Model, term: &Arc<Term>) -> Result<Option<Model>, FilterError> {
     let extended = model.extend(term)?;
     let own = extended.entries[0];
     let little = extended.problem.axes[own].small_size().unwrap_or_default();
@@ -104,6 +101,5 @@ fn fitted_with(
         .map(|(phi, (low, high))| phi.max(*low).min(*high))
         .collect();
     let fitted = climb(&extended.problem, &c.theta(&start), SEARCH.to_the_end)?;
-    let fitted = fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted));
-    Ok(Some((term.clone(), fitted)))
+    Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted)))
 }
