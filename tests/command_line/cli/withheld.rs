@@ -56,8 +56,8 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
         "kept trials give the same bytes"
     );
     assert_eq!(printed["schema"], "truetwin.scorecard/2");
-    // The oscillator takes a step so coarse that it shows, in one of these short records.
-    assert_eq!(printed["coarse_called_structural"]["of"], 1);
+    // The oscillator takes a step so coarse that it shows, in both of these short records.
+    assert_eq!(printed["coarse_called_structural"]["of"], 2);
     assert_eq!(printed["families"], "all");
     let seal = fs::read_to_string(place.join("trials/seal.txt")).unwrap();
     assert_eq!(printed["seal"], seal.trim());

@@ -120,7 +120,7 @@ fn nonsense_ends_the_work_and_is_quoted() {
         (
             "short.py",
             "request['inputs']['u'].pop()".into(),
-            "y has 59 values, 60 samples",
+            "y has 59 values, for 60 samples",
         ),
         (
             "says.py",

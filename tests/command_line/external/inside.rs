@@ -286,7 +286,7 @@ fn a_wrong_answer_is_one_line_that_names_the_method() {
     for (before, parts) in [
         (
             "answer = answer[:1]",
-            &["2 rows of 1 numbers are 16 bytes"][..],
+            &["2 rows of 1 number are 16;"][..],
         ),
         (
             "answer[1] = math.nan",
