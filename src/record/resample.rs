@@ -2,7 +2,7 @@
 
 use super::table::MOST_SAMPLES;
 use crate::math::three_digits;
-use crate::record::{Drive, Record, RecordError, Signal};
+use crate::record::{Drive, Record, RecordError, Signal, UNIFORM};
 use crate::setting::number;
 use crate::storage::untrusted::MOST_NUMBERS;
 
@@ -72,6 +72,13 @@ pub fn resample(
     let most = MOST_SAMPLES.min(MOST_NUMBERS / (1 + inputs + outputs));
     if steps >= most as f64 {
         return refused(&format!("more than {most} samples"), "choose a longer step");
+    }
+    // The last times are written apart, and read as even.
+    if (drive.first_time().abs() + length) * f64::EPSILON > UNIFORM * step {
+        return refused(
+            "rows of one time",
+            "choose a longer step, or let time begin at 0",
+        );
     }
     let samples = steps as usize + 1;
     let longest_gap = longest_gap.unwrap_or(CLOSED_STEPS * drive.dt().max(step));
@@ -254,5 +261,14 @@ mod tests {
                 .to_string();
             assert!(error.contains(part), "{error}");
         }
+        let late = Record::new(
+            short.drive().clone().beginning_at(1.7e9),
+            short.outputs().clone(),
+        );
+        let error = resample(&late.unwrap(), 1e-5, InputRule::Mean, None).unwrap_err();
+        assert!(
+            error.to_string().contains("leaves rows of one time"),
+            "{error}"
+        );
     }
 }

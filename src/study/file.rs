@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use toml::Spanned;
 use toml::de::DeTable;
 
 /// Longest study file, in bytes: a hundred times one that names every parameter and effect.
@@ -240,10 +241,12 @@ impl StudyFile {
     pub(super) fn located(&self, error: StudyError) -> StudyError {
         let line = |text: &str| {
             let (table, name) = error.key()?;
-            let line = line_of_value(text, table, name);
+            let file = DeTable::parse(text).ok()?;
+            let of = |table| value_of(&file, table, name);
             // What a prior leaves may be told in the other table alone.
-            let in_bounds = || line_of_value(text, "bounds", name);
-            line.or_else(|| (table == "prior").then(in_bounds)?)
+            let value = of(table).or_else(|| (table == "prior").then(|| of("bounds"))?);
+            let table = file.get_ref().get(table).map(|table| table.span().start);
+            Some(line(text, value.or(table)?))
         };
         let line = self.origin.as_ref().and_then(|(_, text)| line(text));
         self.at(line, error)
@@ -261,14 +264,13 @@ impl StudyFile {
     }
 }
 
-/// Returns the line of a value of a table, or else that of the table; none where the text has no such table.
-fn line_of_value(text: &str, table: &str, name: &str) -> Option<usize> {
-    let file = DeTable::parse(text).ok()?;
+/// Returns where a value of a table stands in a file.
+fn value_of(file: &Spanned<DeTable<'_>>, table: &str, name: &str) -> Option<usize> {
     let table = file.get_ref().get(table)?;
     // Names may be dotted.
     let value = (table.get_ref().get(name))
         .or_else(|| (name.split('.')).try_fold(table, |at, key| at.get_ref().get(key)));
-    Some(line(text, value.unwrap_or(table).span().start))
+    value.map(|value| value.span().start)
 }
 
 /// Returns how many lines below the first one of a table the key stands that a message is about, of which the parser tells the table alone:
@@ -280,8 +282,8 @@ fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
     };
     let mut of_table = (text.lines().skip(first)).take_while(|line| !line.starts_with('['));
     let is_key = |line: &str| {
-        let rest = line.trim_start().strip_prefix(key);
-        rest.is_some_and(|rest| rest.trim_start().starts_with('='))
+        let (own, _) = line.split_once('=').unwrap_or_default();
+        own.trim().trim_matches(['"', '\'']) == key
     };
     of_table.position(is_key).map_or(0, |below| 1 + below)
 }
@@ -410,6 +412,10 @@ mod tests {
             (
                 "twin = 'x'\n[record.input]\nu1 = {}\n",
                 "s.toml, line 3: [record] input u1 has no plan",
+            ),
+            (
+                "twin = 'x'\n[prior]\n\n'sensor-noise@sensor.std' = [0.3, 0.01]\n",
+                "s.toml, line 4: sensor-noise@sensor.std: invalid interval",
             ),
             (
                 "twin = 'x'\n[record]\ninput = {}\n",

@@ -284,10 +284,7 @@ fn a_wrong_answer_is_one_line_that_names_the_method() {
     }
     let long = "import time; time.sleep(9)";
     for (before, parts) in [
-        (
-            "answer = answer[:1]",
-            &["2 rows of 1 number are 16;"][..],
-        ),
+        ("answer = answer[:1]", &["2 rows of 1 number are 16;"][..]),
         (
             "answer[1] = math.nan",
             &["answered drift with NaN for v at t = 0 s, q = 0.3, v = 0"],
