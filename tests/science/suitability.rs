@@ -127,11 +127,12 @@ fn short_records_have_small_inputs() {
         let plan = RecordPlan::levels(0.5, samples, 0.0, 3.0, hold);
         let study = Study::new("short", BothTanks, plan).unwrap();
         for seed in 0..30 {
-            let found = warnings(&study, &record(&study, seed, |u| u)).into_iter();
-            wrong.extend(found.filter(|(check, _)| ["scale", "inputs"].contains(check)));
+            // An output that is not as large as the runs follows from the input.
+            let mut found = warnings(&study, &record(&study, seed, |u| u)).into_iter();
+            wrong.extend(found.find(|(check, _)| ["scale", "inputs"].contains(check)));
         }
     }
-    // One level in 63 lies below two fifths of the least of 24.
+    // One level in 63 lies below two fifths of the least of 24: of 30 records of one level, more than two would be wrong once in 70 times.
     assert!(wrong.len() <= 2, "{wrong:#?}");
 }
 
