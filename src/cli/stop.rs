@@ -7,7 +7,7 @@ use super::shell_word;
 use crate::external::program::end_all;
 use crate::storage::{remove_unfinished, result};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -33,7 +33,9 @@ struct StoppedCall {
 impl StoppedCall {
     fn text(&self) -> String {
         let resume = &self.call;
-        if let Some(result) = result() {
+        // What is finished inside the folder of the work is a piece of it.
+        let is_piece = |result: &&Path| self.kept.iter().any(|kept| result.starts_with(kept));
+        if let Some(result) = result().filter(|result| !is_piece(result)) {
             return format!("stopped; {} is complete", result.display());
         }
         match &self.kept {

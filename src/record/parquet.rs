@@ -111,6 +111,7 @@ fn line(row: &parquet::record::Row, units: &[Option<i128>]) -> String {
 /// Columns of times.
 #[cfg(feature = "parquet")]
 mod times {
+    use crate::setting::number;
     use jiff::Timestamp;
     use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
     use parquet::record::Field;
@@ -159,7 +160,7 @@ mod times {
         };
         match Timestamp::from_nanosecond(count * unit) {
             Ok(stamp) => stamp.to_string(),
-            Err(_) => format!("{count} beyond the calendar"),
+            Err(_) => format!("{} beyond the calendar", number(count as f64)),
         }
     }
 }

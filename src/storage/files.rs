@@ -1,7 +1,7 @@
 //! Files that appear complete or not at all.
 
 use super::StorageError;
-pub(crate) use super::error::{folder, with_remedy};
+pub(crate) use super::error::with_remedy;
 use super::names::places_beside;
 use super::unfinished::{Unfinished, file_beside, note_result};
 use std::io::{self, Write};

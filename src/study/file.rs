@@ -5,7 +5,6 @@ use crate::equations::{self, Equations};
 use crate::feature::FeatureRecipe;
 use crate::record::UNIFORM;
 use crate::setting::{count, number};
-use crate::storage::files::folder;
 use crate::storage::untrusted::{all_keyed, check_names, line, message, read_text};
 use crate::study::error::StudyError;
 use crate::study::noise_table::NoiseTable;
@@ -119,7 +118,9 @@ impl StudyFile {
         let mut file = Self::parse(&text, path)?;
         let record = &mut file.record;
         if let Some(input) = &mut record.input {
-            input.change_files(|file| *file = folder(path).join(&*file));
+            // Relative to here, a path stays as it is: a study that is written is read as the same.
+            let place = path.parent().unwrap_or(Path::new(""));
+            input.change_files(|file| *file = place.join(&*file));
         }
         let grid = record.input.as_ref().map(grid_of_files).transpose()?;
         if let Some((input, step, samples)) = grid.flatten() {

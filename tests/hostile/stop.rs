@@ -138,6 +138,23 @@ fn a_fit_ends_within_two_seconds() {
     assert_eq!(entries(at), 3, "the study, the record, and the answer");
 }
 
+/// An estimator that is trained on the way is a piece of the work, not its result.
+#[test]
+fn a_reproduction_that_is_stopped_says_how_to_go_on() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let call = "reproduce --twin van-der-pol --runs 500 --bank-size 200 --epochs 2 --out rep";
+    let runs = at.join("rep/runs");
+    let output = interrupted(at, call, "-INT", || entries(&runs) > 0);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(
+        said.contains("finished work is kept in rep; resume with: "),
+        "{said}"
+    );
+    assert!(!said.contains("is complete"), "{said}");
+}
+
 #[test]
 fn work_that_has_kept_nothing_yet_does_not_say_so() {
     let place = tempfile::tempdir().unwrap();
