@@ -118,9 +118,8 @@ impl StudyFile {
         let mut file = Self::parse(&text, path)?;
         let record = &mut file.record;
         if let Some(input) = &mut record.input {
-            // Relative to here, a path stays as it is: a study that is written is read as the same.
-            let place = path.parent().unwrap_or(Path::new(""));
-            input.change_files(|file| *file = place.join(&*file));
+            // A path beside a study that is named alone stays as it is: written, the study is read as the same.
+            input.change_files(|file| *file = path.with_file_name(&*file));
         }
         let grid = record.input.as_ref().map(grid_of_files).transpose()?;
         if let Some((input, step, samples)) = grid.flatten() {
