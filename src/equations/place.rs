@@ -82,15 +82,11 @@ pub(super) fn number(value: &DeValue<'_>) -> Option<f64> {
     match value {
         DeValue::Float(number) => number.as_str().parse().ok(),
         DeValue::Integer(number) => {
-            let whole = i64::from_str_radix(number.as_str(), number.radix());
-            let large = || {
-                number
-                    .as_str()
-                    .parse()
-                    .ok()
-                    .filter(|_| number.radix() == 10)
-            };
-            whole.ok().map(|whole| whole as f64).or_else(large)
+            let digits = number.as_str();
+            match number.radix() {
+                10 => digits.parse().ok(),
+                radix => (i64::from_str_radix(digits, radix).ok()).map(|whole| whole as f64),
+            }
         }
         _ => None,
     }

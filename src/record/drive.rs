@@ -345,22 +345,24 @@ pub(crate) fn check_sizes(
 ) -> Result<(), RecordError> {
     for (channel, values) in signal.columns().into_iter().enumerate() {
         let size = values.fold(0.0, |a: f64, v| a.max(v.abs()));
-        let name = quantities.get(channel).map(|own| own.name.clone());
-        check_size(
-            kind,
-            &name.unwrap_or_else(|| (channel + 1).to_string()),
-            size,
-        )?;
+        check_size(kind, size, || match quantities.get(channel) {
+            Some(own) => own.name.clone(),
+            None => (channel + 1).to_string(),
+        })?;
     }
     Ok(())
 }
 
-/// Checks that a signal of this size can be computed with.
-pub(crate) fn check_size(kind: &'static str, name: &str, size: f64) -> Result<(), RecordError> {
-    match size.is_finite() && size > LARGEST || size > 0.0 && size < 1.0 / LARGEST {
+/// Checks that a signal of this size can be computed with; `name` is asked where it cannot.
+pub(crate) fn check_size(
+    kind: &'static str,
+    size: f64,
+    name: impl FnOnce() -> String,
+) -> Result<(), RecordError> {
+    match size > LARGEST || (size > 0.0 && size < 1.0 / LARGEST) {
         true => Err(RecordError::Size {
             kind,
-            name: name.into(),
+            name: name(),
             size: three_digits(size),
         }),
         false => Ok(()),
@@ -421,6 +423,15 @@ impl PartialEq for FileRows {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_that_cannot_be_squared_are_refused_infinite_ones_too() {
+        let check = |value| check_sizes(&Signal::from_elem((2, 1), value), "output", &[]);
+        for size in [1e101, f64::NEG_INFINITY, 1e-101] {
+            assert!(matches!(check(size), Err(RecordError::Size { name, .. }) if name == "1"));
+        }
+        assert!(check(0.0).is_ok() && check(-3.0).is_ok());
+    }
 
     #[test]
     fn rows_are_slices_whatever_the_layout_was() {

@@ -95,14 +95,16 @@ where
 fn line(row: &parquet::record::Row, units: &[Option<i128>]) -> String {
     use parquet::record::Field;
 
-    let cell = |((_, field), unit): ((&String, &Field), &Option<i128>)| match (field, unit) {
-        (Field::Null, _) => String::new(),
-        (field, Some(unit)) => times::stamp(field, *unit),
-        // With an exponent where it is very large or small.
-        (Field::Double(value), _) => format!("{value:?}"),
-        (Field::Float(value), _) => format!("{:?}", f64::from(*value)),
-        // Anything else that is no number is named by the checks of a cell.
-        (other, _) => other.to_string().replace([',', '\n', '"'], " "),
+    let cell = |((_, field), unit): ((&String, &Field), &Option<i128>)| {
+        let stamp = unit.and_then(|unit| times::stamp(field, unit));
+        stamp.unwrap_or_else(|| match field {
+            // With an exponent where it is very large or small.
+            Field::Double(value) => format!("{value:?}"),
+            Field::Float(value) => format!("{:?}", f64::from(*value)),
+            Field::Null => String::new(),
+            // Anything else that is no number is named by the checks of a cell.
+            other => other.to_string().replace([',', '\n', '"'], " "),
+        })
     };
     let cells: Vec<String> = row.get_column_iter().zip(units).map(cell).collect();
     cells.join(",") + "\n"
@@ -112,6 +114,7 @@ fn line(row: &parquet::record::Row, units: &[Option<i128>]) -> String {
 #[cfg(feature = "parquet")]
 mod times {
     use crate::setting::number;
+    use crate::storage::untrusted::excerpt;
     use jiff::Timestamp;
     use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
     use parquet::record::Field;
@@ -122,7 +125,7 @@ mod times {
     pub(super) fn unit(column: &ColumnDescriptor) -> Result<Option<i128>, String> {
         let unit = match (column.logical_type_ref(), column.converted_type()) {
             _ if column.physical_type() == Type::INT96 => {
-                let name = crate::storage::untrusted::excerpt(column.name());
+                let name = excerpt(column.name());
                 let remedy = "save it as a timestamp of milliseconds, microseconds or nanoseconds";
                 return Err(format!("column {name} is of the old type INT96; {remedy}"));
             }
@@ -148,28 +151,26 @@ mod times {
         }
     }
 
-    /// A time as text that is exact: of a day, or of the first of 1970.
-    pub(super) fn stamp(field: &Field, unit: i128) -> String {
+    /// A time as text that is exact, of a day or of the first of 1970; `None` of a cell that is no count.
+    pub(super) fn stamp(field: &Field, unit: i128) -> Option<String> {
         let count = match *field {
             Field::Long(n)
             | Field::TimestampMillis(n)
             | Field::TimestampMicros(n)
             | Field::TimeMicros(n) => i128::from(n),
             Field::Int(n) | Field::TimeMillis(n) | Field::Date(n) => i128::from(n),
-            _ => return field.to_string().replace([',', '\n', '"'], " "),
+            _ => return None,
         };
-        match Timestamp::from_nanosecond(count * unit) {
-            Ok(stamp) => stamp.to_string(),
-            Err(_) => format!("{} beyond the calendar", number(count as f64)),
-        }
+        let stamp = Timestamp::from_nanosecond(count * unit).map(|stamp| stamp.to_string());
+        Some(stamp.unwrap_or_else(|_| format!("{} beyond the calendar", number(count as f64))))
     }
 }
 
 #[cfg(all(test, feature = "parquet"))]
 mod tests {
     use crate::record::{Record, RecordError};
-    use parquet::data_type::{DoubleType, Int64Type};
-    use parquet::file::writer::SerializedFileWriter;
+    use parquet::data_type::{DataType, DoubleType, Int64Type};
+    use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
     use parquet::schema::parser::parse_message_type;
     use std::path::Path;
     use std::sync::Arc;
@@ -181,20 +182,16 @@ mod tests {
         let file = std::fs::File::create(path).unwrap();
         let mut writer = SerializedFileWriter::new(file, schema, Arc::default()).unwrap();
         let mut group = writer.next_row_group().unwrap();
-        let mut column = group.next_column().unwrap().unwrap();
-        column
-            .typed::<Int64Type>()
-            .write_batch(t, None, None)
-            .unwrap();
-        column.close().unwrap();
-        let mut column = group.next_column().unwrap().unwrap();
-        column
-            .typed::<DoubleType>()
-            .write_batch(y, None, None)
-            .unwrap();
-        column.close().unwrap();
+        column::<Int64Type>(&mut group, t);
+        column::<DoubleType>(&mut group, y);
         group.close().unwrap();
         writer.close().unwrap();
+    }
+
+    fn column<T: DataType>(group: &mut SerializedRowGroupWriter<'_, std::fs::File>, all: &[T::T]) {
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<T>().write_batch(all, None, None).unwrap();
+        column.close().unwrap();
     }
 
     fn read(kind: &str, t: &[i64], y: &[f64]) -> Result<Record, RecordError> {

@@ -6,7 +6,7 @@ use crate::studies::short;
 use crate::timeless::timeless;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 fn start(folder: &Path, arguments: &str) -> std::process::Child {
@@ -33,8 +33,8 @@ fn named(folder: &Path) -> usize {
     all.filter(|entry| !unnamed(entry)).count()
 }
 
-/// Sends a signal once `ready`, and waits for the end.
-fn interrupted(folder: &Path, arguments: &str, signal: &str, ready: impl Fn() -> bool) -> Output {
+/// Sends a signal once `ready`, and waits for the end, whose code is 130; returns what is said.
+fn interrupted(folder: &Path, arguments: &str, signal: &str, ready: impl Fn() -> bool) -> String {
     let child = start(folder, arguments);
     let since = Instant::now();
     while !ready() && since.elapsed() < Duration::from_secs(60) {
@@ -48,7 +48,10 @@ fn interrupted(folder: &Path, arguments: &str, signal: &str, ready: impl Fn() ->
             .unwrap()
             .success()
     );
-    child.wait_with_output().unwrap()
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    said
 }
 
 #[test]
@@ -59,9 +62,7 @@ fn a_bank_that_is_stopped_says_how_to_go_on_and_does() {
     for (signal, name) in [("-INT", "int"), ("-TERM", "term")] {
         let call = format!("{bank} --out {name}");
         let shards = at.join(name).join("shards");
-        let output = interrupted(at, &call, signal, || entries(&shards) > 3);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(130), "{said}");
+        let said = interrupted(at, &call, signal, || entries(&shards) > 3);
         assert_eq!(said.trim().lines().count(), 1, "{said}");
         assert!(said.contains("stopped") && said.contains(&call), "{said}");
         assert!((4..64).contains(&entries(&shards)));
@@ -92,9 +93,7 @@ fn a_training_that_is_stopped_says_how_to_go_on() {
     let at = place.path();
     let call = "pretrain --twin van-der-pol --bank-size 20000 --epochs 5000 --out v.est";
     let shards = at.join("v.est.part/bank/shards");
-    let output = interrupted(at, call, "-INT", || entries(&shards) > 0);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{said}");
+    let said = interrupted(at, call, "-INT", || entries(&shards) > 0);
     assert!(
         said.contains("resume with: ") && said.contains(call),
         "{said}"
@@ -122,11 +121,9 @@ fn a_fit_ends_within_two_seconds() {
     let begun = Instant::now();
     let later = || begun.elapsed() > Duration::from_millis(1500);
     let call = "fit r.csv --study short.toml --draws 1000000 --out o";
-    let output = interrupted(at, call, "-TERM", later);
+    let said = interrupted(at, call, "-TERM", later);
     // Two seconds are documented; the rest is for a loaded machine.
     assert!(begun.elapsed() < Duration::from_millis(1500 + 2000 + 2000));
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{said}");
     if said.contains("error:") {
         assert_eq!(said.trim(), "error: stopped; nothing was written");
         assert_eq!(entries(at), 2, "the study and the record");
@@ -145,9 +142,7 @@ fn a_reproduction_that_is_stopped_says_how_to_go_on() {
     let at = place.path();
     let call = "reproduce --twin van-der-pol --runs 500 --bank-size 200 --epochs 2 --out rep";
     let runs = at.join("rep/runs");
-    let output = interrupted(at, call, "-INT", || entries(&runs) > 0);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{said}");
+    let said = interrupted(at, call, "-INT", || entries(&runs) > 0);
     assert!(
         said.contains("finished work is kept in rep; resume with: "),
         "{said}"
@@ -162,9 +157,7 @@ fn work_that_has_kept_nothing_yet_does_not_say_so() {
     let begun = Instant::now();
     let soon = || begun.elapsed() > Duration::from_millis(300);
     let call = "withheld --twin tanks --trials 100000 --out w";
-    let output = interrupted(at, call, "-INT", soon);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{said}");
+    let said = interrupted(at, call, "-INT", soon);
     assert_eq!(said.trim(), "error: stopped; nothing was written");
     assert_eq!(entries(at), 0);
 }

@@ -3,6 +3,7 @@
 use crate::cli::prelude::*;
 use crate::estimator::bank::file;
 use crate::estimator::shards::{merge, merge_into_file};
+use crate::setting::count;
 
 /// Merge the banks of a job array, or convert a bank into one .npz or .csv file.
 #[derive(Debug, Args)]
@@ -34,22 +35,17 @@ impl Verb for Merge {
         }
         let out = self.out.display();
         let progress = context.progress;
-        let (what, count) = match file::is_named(&self.out) {
+        let (what, merged) = match file::is_named(&self.out) {
             true => (
-                "simulations",
+                "simulation",
                 merge_into_file(&self.from, &self.out, progress)?,
             ),
-            false => ("shards", merge(&self.from, &self.out, progress)?),
+            false => ("shard", merge(&self.from, &self.out, progress)?),
         };
         let json = json!({
-            "schema": "truetwin.merge/1", "out": output::name(&self.out), "what": what, "count": count,
+            "schema": "truetwin.merge/1", "out": output::name(&self.out), "what": format!("{what}s"), "count": merged,
         });
-        let text = || {
-            format!(
-                "{out}: {}",
-                crate::setting::count(count, what.trim_end_matches('s'))
-            )
-        };
+        let text = || format!("{out}: {}", count(merged, what));
         Provenance::new(context).print_beside(context, json, text)
     }
 }

@@ -123,24 +123,28 @@ fn number_of_trials(text: &str) -> Result<usize, String> {
 
 /// Parses a part of a diagnosis.
 fn ablation(text: &str) -> Result<Ablation, String> {
-    let found = Ablation::ALL.into_iter().find(|part| part.id() == text);
-    known("part", found, text, &Ablation::ALL.map(Ablation::id))
+    known("part", text, Ablation::ALL.map(|part| (part.id(), part)))
 }
 
 /// Parses a kind of truth.
 fn kind(text: &str) -> Result<Kind, String> {
-    known("kind", Kind::named(text), text, &Kind::ALL.map(Kind::id))
+    known("kind", text, Kind::ALL.map(|kind| (kind.id(), kind)))
 }
 
 /// Parses a nuisance.
 fn nuisance(text: &str) -> Result<NuisanceKind, String> {
-    let all = NuisanceKind::ALL.map(NuisanceKind::id);
-    known("nuisance", NuisanceKind::named(text), text, &all)
+    known(
+        "nuisance",
+        text,
+        NuisanceKind::ALL.map(|kind| (kind.id(), kind)),
+    )
 }
 
-/// The value found by its name; else an error that lists the names.
-fn known<T>(what: &str, found: Option<T>, text: &str, names: &[&str]) -> Result<T, String> {
-    found.ok_or_else(|| {
+/// The value of this name; else an error that lists the names.
+fn known<T, const N: usize>(what: &str, text: &str, all: [(&str, T); N]) -> Result<T, String> {
+    let names = all.each_ref().map(|(name, _)| *name);
+    let found = all.into_iter().find(|(name, _)| *name == text);
+    found.map(|(_, value)| value).ok_or_else(|| {
         let near = did_you_mean(text, names);
         let all = names.join(", ");
         format!("no {what} is called \"{text}\"{near}; there are {all}")

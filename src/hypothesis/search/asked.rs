@@ -96,10 +96,6 @@ fn fitted_with(model: &Model, term: &Arc<Term>) -> Result<Option<Model>, FilterE
             return Ok(None);
         }
     }
-    let ends = c.lower().iter().zip(c.upper());
-    let start: Vec<f64> = (phi.iter().zip(ends))
-        .map(|(phi, (low, high))| phi.max(*low).min(*high))
-        .collect();
-    let fitted = climb(&extended.problem, &c.theta(&start), SEARCH.to_the_end)?;
+    let fitted = climb(&extended.problem, &c.theta(&phi), SEARCH.to_the_end)?;
     Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted)))
 }

@@ -134,8 +134,12 @@ fn measured_equations(
             .collect()
     };
     let motion = free_motion(base, records, &theta, fallback);
-    for (state, &size) in outline.states.iter().zip(&motion) {
-        check_size("state", &state.name, size)?;
+    let finite = motion
+        .iter()
+        .enumerate()
+        .filter(|(_, size)| size.is_finite());
+    for (i, &size) in finite {
+        check_size("state", size, || outline.states[i].name.clone())?;
     }
     let mut sizes = RecordSizes {
         starts: widths(&motion),

@@ -7,6 +7,7 @@ use crate::report::digits::{SHOWN, probability, short, with_error};
 use crate::report::document::Column::{Number, Text};
 use crate::report::document::{Block, Document, Section};
 use crate::report::parameters::{ParameterRow, values};
+use crate::setting::count;
 use crate::study::Study;
 use serde_json::{Value, json};
 
@@ -99,11 +100,7 @@ pub(crate) fn together_document(study: &Study, all: &Together, files: &[String])
         answer: vec![
             Block::Headline(format!(
                 "The records {word} (χ² = {q}, {} of freedom, {p}){why}.",
-                if n == 1 {
-                    "1 degree".into()
-                } else {
-                    format!("{n} degrees")
-                }
+                count(n, "degree")
             )),
             values("", INTERVAL_LEVEL, &rows(study, all)),
             Block::paragraph("Each record is estimated, the answers weighed by their precision."),

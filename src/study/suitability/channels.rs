@@ -75,8 +75,8 @@ pub(super) fn check(
             );
         }
         let outliers = outliers(&values);
-        let usual = own.iter().map(|own| self::outliers(own).len()).max();
-        if outliers.len() > 2 * usual.unwrap_or(0) {
+        let is_usual = |own: &Vec<f64>| outliers.len() <= 2 * self::outliers(own).len();
+        if !outliers.is_empty() && !own.iter().any(is_usual) {
             let largest = outliers.iter().map(|(_, z)| *z).fold(0.0, f64::max);
             let named: Vec<String> = (outliers.iter().take(LIMITS.named))
                 .map(|(at, _)| record.drive().rows().line(rows[*at]).to_string())

@@ -84,9 +84,8 @@ impl Study {
         let constants = planned.as_ref().and_then(|r| self.time_constants(r));
         let (found, unit) = time::check(self, &record, constants);
         findings.extend(found);
-        let plans = (0..LIMITS.draws).filter_map(|draw| drawn(noise.child("plan").sample(draw)));
-        let plans: Vec<Drive> = plans.map(|plan| plan.first(record.samples())).collect();
-        let (found, factors) = size::check_inputs(self, &record, planned_drive, &plans);
+        let again = |draw| drawn(noise.child("plan").sample(draw));
+        let (found, factors) = size::check_inputs(self, &record, planned_drive, again);
         findings.extend(found);
         // Further checks are not to repeat what is known: they see the record in the right units.
         let record = size::with_inputs_divided(time::in_seconds(record, unit)?, &factors)?;

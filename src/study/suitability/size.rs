@@ -10,13 +10,12 @@ use crate::twin::conformance::Finding;
 /// Share of the largest planned input that the largest one of a record reaches in the right unit.
 const REACHED: (f64, f64) = (0.3, 1.05);
 
-/// Checks inputs against the plan, and against records of their length that are drawn of it; also returns the power of ten that each is too
-/// large by.
+/// Checks inputs against the plan, small ones against further draws of it, too; also returns the power of ten that each is too large by.
 pub(super) fn check_inputs(
     study: &Study,
     record: &Record,
     planned: Option<&Drive>,
-    plans: &[Drive],
+    drawn: impl Fn(u64) -> Option<Drive>,
 ) -> (Vec<Finding>, Vec<f64>) {
     let inputs = study.twin().signals().inputs;
     let (mut findings, mut factors) = (vec![], vec![1.0; inputs.len()]);
@@ -46,11 +45,15 @@ pub(super) fn check_inputs(
         let most_planned = low.abs().max(high.abs());
         let reach_of = |values: &[f64]| largest(values) / most_planned;
         let reach = reach_of(&values);
-        // A short record may have small levels alone.
-        let usual = (plans.iter()).map(|plan| reach_of(&present(plan.inputs(), j).1));
-        let usual = usual.fold(REACHED.0, f64::min);
+        // A short record may have small levels alone: as small as one of its length that is drawn.
+        let is_small = |plan: Drive| {
+            let plan = plan.first(record.samples());
+            reach >= reach_of(&present(plan.inputs(), j).1) / LIMITS.doubted
+        };
+        let is_usual = || (0..LIMITS.draws).filter_map(&drawn).any(is_small);
         let in_reach = |factor: &f64| (REACHED.0..=REACHED.1).contains(&(reach / factor));
-        let is_doubted = !(usual / LIMITS.doubted..=LIMITS.doubted).contains(&reach);
+        let is_doubted =
+            reach > LIMITS.doubted || reach < REACHED.0 / LIMITS.doubted && !is_usual();
         if is_doubted && let Some(factor) = powers().find(in_reach) {
             let message = format!("{given}; {} if the unit differs", conversion(factor));
             findings.push(Finding::warning("scale", message));

@@ -1,11 +1,10 @@
 //! θ and the conditions of a record.
 
-use crate::evaluate::trials::Kind;
-use crate::evaluate::trials::NuisanceKind;
 use crate::evaluate::trials::draft::index;
 use crate::evaluate::trials::numbers::TRIAL;
 use crate::evaluate::trials::scene::Scene;
 use crate::evaluate::trials::world::{Conditions, Feedback};
+use crate::evaluate::trials::{Kind, NuisanceKind};
 use crate::twin::{Parameter, ParameterSpace, Role, Source};
 
 /// Lags in samples at which an output may answer an input, for the sign of a feedback.

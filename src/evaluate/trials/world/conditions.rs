@@ -71,11 +71,6 @@ impl NuisanceKind {
             Self::Gaps => "gaps",
         }
     }
-
-    /// The nuisance with this id.
-    pub fn named(id: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.id() == id)
-    }
 }
 
 /// Proportional feedback from the first output to the first input.
@@ -259,6 +254,13 @@ mod tests {
         assert!((moment(&tailed, 0) - 1.0).abs() < 0.1);
         let far = |v: &[f64]| v.iter().filter(|v| v.abs() > 4.0).count();
         assert!(far(&tailed) > 20 && far(&coloured) < 10);
+    }
+
+    #[test]
+    fn nuisances_have_one_name_in_calls_and_files() {
+        for kind in NuisanceKind::ALL {
+            assert_eq!(serde_json::to_value(kind).unwrap(), kind.id());
+        }
     }
 
     #[test]
