@@ -38,9 +38,9 @@ def test_wrong_arguments_are_refused_before_the_program_starts(record):
     twin = truetwin.Twin(heater, **SETTING)
     with pytest.raises(ValueError, match="different lengths .*power: 99"):
         twin.fit({**record, "power": record["power"][:99]})
-    with pytest.raises(ValueError, match="temperature: .* holds other values than numbers"):
+    with pytest.raises(ValueError, match=r"record 1, column temperature: 'warm' in row 0 \(counted from 0\), which is no number"):
         twin.fit({**record, "temperature": ["warm"] * 100})
-    with pytest.raises(TypeError, match="a record of type int"):
+    with pytest.raises(TypeError, match="record 1: a record of type int"):
         twin.fit([3])
     with pytest.raises(TypeError, match="records of type NoneType; give a path"):
         twin.fit(None)
@@ -105,7 +105,7 @@ def test_an_exception_of_the_simulator_comes_through(record):
         (lambda n: 1.0, r"shape \(\) for the output temperature"),
         (lambda n: np.zeros((n, 2)), r"shape \(100, 2\) for the output temperature"),
         (lambda n: {"heat": np.zeros(n)}, "the outputs heat; return temperature"),
-        (lambda n: ["warm"] * n, "could not convert string to float"),
+        (lambda n: ["warm"] * n, "the simulator returned 'warm' in row 0 "),
         (lambda n: None, "returned None; end it with `return`"),
     ],
 )

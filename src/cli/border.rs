@@ -4,6 +4,7 @@ use super::failure::Failure;
 use crate::storage::StorageError;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 use std::thread;
@@ -40,12 +41,17 @@ pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T,
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|fault| Err(failure(&*fault)))
 }
 
-/// Writes the files of a result and prints it: printed it is also where it cannot be written, and the code of the failure is the call's.
+/// Writes the files of a result and prints it. Where they cannot be written it is printed, and kept elsewhere; the code of the failure is
+/// the call's.
 pub(super) fn deliver(
     write: impl FnOnce() -> Result<(), Failure>,
+    keep: impl FnOnce() -> Option<PathBuf>,
     print: impl FnOnce() -> Result<ExitCode, Failure>,
 ) -> Result<ExitCode, Failure> {
-    let written = guarded(write);
+    let written = guarded(write).map_err(|failure| match keep() {
+        Some(place) => failure.and(&format!("the answer is in {}", place.display())),
+        None => failure,
+    });
     let printed = guarded(print);
     written.and(printed)
 }
@@ -87,10 +93,12 @@ mod tests {
             printed.set(printed.get() + 1);
             Ok(ExitCode::SUCCESS)
         };
-        let full = deliver(|| Err(Failure::user("no room")), print).unwrap_err();
+        let keep = || Some("a.json".into());
+        let full = deliver(|| Err(Failure::user("no room")), keep, print).unwrap_err();
         assert_eq!((full.code(), printed.get()), (2, 1));
-        let fault = deliver(|| panic!("a picture"), print).unwrap_err();
+        assert!(format!("{full:?}").contains("no room; the answer is in a.json"));
+        let fault = deliver(|| panic!("a picture"), || None, print).unwrap_err();
         assert_eq!((fault.code(), printed.get()), (1, 2));
-        assert!(deliver(|| Ok(()), print).is_ok());
+        assert!(deliver(|| Ok(()), || unreachable!(), print).is_ok());
     }
 }

@@ -2,10 +2,10 @@
 
 use super::remedy::{Cause, Remedy};
 pub(super) use super::terminal::say;
-use crate::storage::untrusted::one_line;
+use crate::storage::untrusted::{one_line, short_words};
 use crate::storage::work::Ranks;
 use crate::study::StudyError;
-use std::fmt::Display;
+use std::fmt::{self, Display, Formatter};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -103,6 +103,12 @@ impl Failure {
         }
     }
 
+    /// Adds what follows from it.
+    pub fn and(mut self, more: &str) -> Self {
+        self.message = format!("{}; {more}", self.message);
+        self
+    }
+
     /// Adds the name of the file unless the message has it.
     pub fn within(mut self, path: &Path) -> Self {
         let name = path.display().to_string();
@@ -138,8 +144,19 @@ impl Failure {
 
     /// Prints the line and gives the exit code.
     pub fn report(self) -> ExitCode {
-        say(&format!("error: {}", one_line(&self.message, LONGEST)));
+        // Its end is the remedy.
+        let message = match self.message.chars().nth(LONGEST) {
+            Some(_) => &short_words(&self.message),
+            None => &self.message,
+        };
+        say(&format!("error: {}", one_line(message, LONGEST)));
         ExitCode::from(self.code())
+    }
+}
+
+impl Display for Failure {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
     }
 }
 

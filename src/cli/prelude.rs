@@ -1,6 +1,5 @@
 //! Names that every verb uses.
 
-pub(super) use crate::cli::border::deliver;
 pub(super) use crate::cli::context::{Context, Verb};
 pub(super) use crate::cli::failure::{Failure, InFile};
 pub(super) use crate::cli::options::{FileColumns, PresetArgument, Subject, at_least_one};

@@ -1,11 +1,14 @@
 //! Where a result comes from: version, call, seed, files.
 
+use super::border::deliver;
 use super::context::Context;
 use super::failure::Failure;
 use super::output;
 use super::shell_word;
 use crate::report::Document;
-use crate::storage::reading::checksum_of_read;
+use crate::storage::files::keep_elsewhere;
+use crate::storage::reading::{checksum_of_read, has_changed};
+use crate::storage::result;
 use jiff::Timestamp;
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
@@ -113,7 +116,40 @@ impl Provenance {
         json: &Value,
         text: impl FnOnce() -> String,
     ) -> Result<ExitCode, Failure> {
-        context.print(json, || self.below(&text()))
+        let code = context.print(json, || self.below(&text()))?;
+        self.tell_changes();
+        Ok(code)
+    }
+
+    /// Writes the files of a result and prints it, as [`print`](Self::print) does; where they cannot be written, its JSON is kept elsewhere.
+    pub fn deliver(
+        &self,
+        context: &Context<'_>,
+        json: &Value,
+        write: impl FnOnce() -> Result<(), Failure>,
+        text: impl FnOnce() -> String,
+    ) -> Result<ExitCode, Failure> {
+        let keep = || {
+            let verb = json["schema"].as_str().unwrap_or_default();
+            let verb = verb.split(['.', '/']).nth(1).unwrap_or("answer");
+            match result() {
+                Some(_) => None,
+                None => keep_elsewhere(&format!("truetwin-{verb}.json"), &format!("{json:#}\n")),
+            }
+        };
+        deliver(write, keep, || self.print(context, json, text))
+    }
+
+    /// Says which files have changed while the work went on.
+    fn tell_changes(&self) {
+        let mut paths: Vec<&Path> = self.files.iter().map(|file| &*file.path).collect();
+        paths.dedup();
+        for path in paths.into_iter().filter(|path| has_changed(path)) {
+            output::say(&format!(
+                "warning: {} has changed since it was read; this answer is of the file as it was, see its sha256",
+                path.display()
+            ));
+        }
     }
 
     /// Prints a result that scripts read; where it comes from goes to standard error, without `--json`.
@@ -127,6 +163,7 @@ impl Provenance {
         if !context.json {
             output::say(&self.last_line());
         }
+        self.tell_changes();
         Ok(code)
     }
 

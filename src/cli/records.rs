@@ -5,6 +5,7 @@ use super::output;
 use crate::math::{six_digits, three_digits};
 use crate::record::{Record, RecordReader, column_names};
 use crate::setting::number;
+use crate::storage::reading::is_pipe;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -21,7 +22,18 @@ pub(super) fn read(
     validation: Option<&Path>,
 ) -> Result<(Vec<Record>, Option<Record>), Failure> {
     let mut records = Vec::new();
-    for path in paths.iter().map(PathBuf::as_path).chain(validation) {
+    let all: Vec<&Path> = paths
+        .iter()
+        .map(PathBuf::as_path)
+        .chain(validation)
+        .collect();
+    for (number, path) in all.iter().enumerate() {
+        if is_pipe(path) && all[..number].contains(path) {
+            return Err(Failure::user(format!(
+                "{}: it is a pipe, which can be read once; name it once",
+                path.display()
+            )));
+        }
         let record = reader.record(path)?;
         warn_of_outlier(path, &record);
         if let Some(same) = records.iter().position(|other| *other == record) {

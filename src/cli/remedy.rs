@@ -159,7 +159,7 @@ impl Remedy for StudyError {
             Self::NoTwin(_) | Self::Twin { .. } => "`truetwin twins` lists them".into(),
             Self::Twice { table, .. } => format!("[fixed] and [{table}] of the study file"),
             Self::AllFixed => "`truetwin fit` tests the twin on a record".into(),
-            Self::UnknownEffect(_) | Self::Without(_) => {
+            Self::UnknownEffect { .. } | Self::Without(_) => {
                 "`truetwin effects --twin T` lists those of a twin".into()
             }
             Self::NoInput(_) => {

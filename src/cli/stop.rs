@@ -5,6 +5,7 @@ use super::failure::{Failure, STOPPED, say};
 use super::remedy::Cause;
 use super::shell_word;
 use crate::external::program::end_all;
+use crate::storage::work::has_pieces;
 use crate::storage::{remove_unfinished, result};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -39,9 +40,14 @@ impl StoppedCall {
             return format!("stopped; {} is complete", result.display());
         }
         match &self.kept {
-            Some(folder) if folder.exists() => {
+            Some(folder) if has_pieces(folder) => {
                 let folder = folder.display();
                 format!("stopped; finished work is kept in {folder}; resume with: {resume}")
+            }
+            Some(folder) if folder.exists() => {
+                format!(
+                    "stopped; no piece of the work was finished yet; begin again with: {resume}"
+                )
             }
             _ => "stopped; nothing was written".into(),
         }
@@ -74,7 +80,7 @@ fn leave() {
     thread::sleep(MOMENT);
     let Some(stop) = STOP.get() else { return };
     if ENDS.load(Ordering::Relaxed) {
-        say("stopping with what was found so far; Ctrl-C again ends at once");
+        say("stopping at the next step of the search; Ctrl-C again ends at once");
         return;
     }
     say(&format!("error: {}", stop.text()));

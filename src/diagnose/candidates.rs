@@ -16,7 +16,11 @@ pub(super) fn listed(
     fitted_noise: &[String],
 ) -> Result<Vec<Term>, StudyError> {
     if let Some(name) = without.iter().find(|name| !study.knows_effect(name)) {
-        return Err(StudyError::Without(study.with_nearest_effect(name)));
+        return Err(StudyError::Without(format!(
+            "{}{}",
+            name.as_str(),
+            study.nearest_effect(name)
+        )));
     }
     let already = already(study);
     let mut terms = vec![];

@@ -119,6 +119,17 @@ pub(super) fn check_given(effect: &Effect) -> Result<(), TwinError> {
     check_range(effect)
 }
 
+/// Checks magnitudes that are all given at a step in seconds, as a delay, which a register of so many samples keeps.
+pub(super) fn check_at(effect: &Effect, step: f64) -> Result<(), TwinError> {
+    let given = effect.magnitudes().iter().map(|m| effect.given(m.name));
+    let Some(values) = given.collect::<Option<Vec<f64>>>() else {
+        return Ok(());
+    };
+    let first = effect.magnitudes().first().map_or("id", |m| m.name);
+    let check = effect.kind().check_values(&values, step);
+    check.map_err(|problem| refused(effect, first, &format!(": {problem}")))
+}
+
 /// Checks that the ends of a range, which are off at −∞ and at ∞, are in order where both are given.
 fn check_range(effect: &Effect) -> Result<(), TwinError> {
     let end = |off: f64| {

@@ -1,7 +1,7 @@
 //! Effects in files: `[[effect]]` tables, with the lines of what is wrong in them.
 
 use super::catalogue::Catalogue;
-use super::check::check_given;
+use super::check::{check_at, check_given};
 use super::placed::{Effect, EffectEntry};
 use crate::storage::untrusted::{all_keyed, check_names, line, message, read_text};
 use crate::twin::TwinError;
@@ -24,16 +24,16 @@ impl Catalogue {
     ///
     /// Magnitudes are checked; targets are, when the effects are added to a twin.
     pub fn parse(&self, text: &str) -> Result<Vec<Effect>, TwinError> {
-        self.parse_file(text, Path::new("effects"))
+        self.parse_file(text, Path::new("effects"), None)
     }
 
-    /// Reads effects from a file.
-    pub fn read(&self, path: &Path) -> Result<Vec<Effect>, TwinError> {
+    /// Reads effects from a file, for simulations at this step in seconds.
+    pub fn read(&self, path: &Path, step: f64) -> Result<Vec<Effect>, TwinError> {
         let text = read_text(path, LARGEST_FILE).map_err(|error| TwinError::EffectFile {
             path: path.into(),
             error: error.to_string(),
         })?;
-        let effects = self.parse_file(&text, path)?;
+        let effects = self.parse_file(&text, path, Some(step))?;
         match effects.is_empty() {
             true => Err(TwinError::EffectText {
                 path: path.into(),
@@ -44,7 +44,12 @@ impl Catalogue {
         }
     }
 
-    fn parse_file(&self, text: &str, path: &Path) -> Result<Vec<Effect>, TwinError> {
+    fn parse_file(
+        &self,
+        text: &str,
+        path: &Path,
+        step: Option<f64>,
+    ) -> Result<Vec<Effect>, TwinError> {
         let wrong = |line: usize, problem: &str| {
             let lines = problem.lines().map(str::trim);
             let lines: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
@@ -65,6 +70,7 @@ impl Catalogue {
             .map(|(index, entry)| {
                 let checked = self.resolve(entry).and_then(|effect| {
                     check_given(&effect)?;
+                    step.map_or(Ok(()), |step| check_at(&effect, step))?;
                     Ok(effect)
                 });
                 checked.map_err(|error| {

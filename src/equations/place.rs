@@ -24,15 +24,16 @@ impl SourceText<'_> {
             return Some(Ok(PlacedExpression {
                 expression: Expression::number(number),
                 start: value.span().start,
-                is_verbatim: false,
+                bytes: vec![],
             }));
         }
         let text = value.get_ref().as_str()?;
-        let (start, is_verbatim) = self.inside(value, text);
+        let start = value.span().start;
+        let raw = self.0.get(value.span()).unwrap_or_default();
         let placed = |expression| PlacedExpression {
             expression,
             start,
-            is_verbatim,
+            bytes: bytes_in(raw, text),
         };
         Some(match Expression::parse(text) {
             Ok(expression) => Ok(placed(expression)),
@@ -42,33 +43,62 @@ impl SourceText<'_> {
             }
         })
     }
+}
 
-    /// Byte at which the content of a text begins, and whether it stands in the file as it is.
-    fn inside(&self, value: &Spanned<DeValue<'_>>, text: &str) -> (usize, bool) {
-        let span = value.span();
-        let raw = self.0.get(span.clone()).unwrap_or_default();
-        match raw.find(text).filter(|_| !text.is_empty()) {
-            Some(at) => (span.start + at, true),
-            None => (span.start, false),
-        }
+/// Returns the byte of a string in a file for each byte of the text that it stands for: quotes and escapes take more.
+fn bytes_in(raw: &str, text: &str) -> Vec<usize> {
+    let is_literal = raw.starts_with('\'');
+    let quote = raw.chars().next().unwrap_or_default();
+    let mut at = raw.len() - raw.trim_start_matches(quote).len();
+    if text.is_empty() || raw.len() < 2 * at {
+        at = at.min(1);
     }
+    let mut bytes = Vec::with_capacity(text.len());
+    for c in text.chars() {
+        let mut rest = raw.get(at..).unwrap_or_default();
+        // What ends a line is left out behind the first quotes and behind a stroke, and its return always is.
+        loop {
+            let skipped = match rest.as_bytes() {
+                [b'\r', b'\n', ..] => 1,
+                [b'\n', ..] if c != '\n' => 1,
+                [b'\\', b' ' | b'\t' | b'\r' | b'\n', ..] if !is_literal => {
+                    rest.len() - rest[1..].trim_start().len()
+                }
+                _ => break,
+            };
+            rest = &rest[skipped..];
+        }
+        at = raw.len() - rest.len();
+        bytes.extend(std::iter::repeat_n(at, c.len_utf8()));
+        at += match rest.as_bytes() {
+            [b'\\', escape, ..] if !is_literal => match escape {
+                b'x' => 4,
+                b'u' => 6,
+                b'U' => 10,
+                _ => 2,
+            },
+            _ => c.len_utf8(),
+        };
+    }
+    bytes
 }
 
 /// An expression in a file.
 #[derive(Debug, Clone)]
 pub(super) struct PlacedExpression {
     pub expression: Expression,
+    /// Byte at which the value begins, and those of the text within it.
     start: usize,
-    is_verbatim: bool,
+    bytes: Vec<usize>,
 }
 
 impl PlacedExpression {
     /// Returns the byte of the file for a byte of the expression.
     pub fn byte(&self, at: usize) -> usize {
-        match self.is_verbatim {
-            true => self.start + at,
-            false => self.start,
-        }
+        // A word that is missing is behind the last one.
+        let behind = || self.bytes.last().map(|last| last + 1);
+        let own = self.bytes.get(at).copied().or_else(behind);
+        self.start + own.unwrap_or(0)
     }
 
     /// Returns the place of a problem.

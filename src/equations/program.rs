@@ -160,6 +160,8 @@ impl StateSpace for Program {
             // Ends in the wrong order leave a state alone: θ that crosses them is for the prior to exclude.
             if ends[0] < ends[1] {
                 *x = Interval::unchecked(ends[0], ends[1]).clamp(*x);
+            } else if ends[0].is_nan() || ends[1].is_nan() {
+                *x = f64::NAN;
             }
         }
     }

@@ -126,6 +126,14 @@ fn faults_are_one_line_with_their_place() {
             "line 5, column 8: unknown function \"sinn\"",
         ),
         (
+            "[states]\nh = { rate = \"\\u002dk*h + \\x28zz)\" }\n",
+            "line 4, column 31: unknown name \"zz\"",
+        ),
+        (
+            "[states]\nh = { rate = \"\"\"\nk*h + \\\n   sinn(h)\"\"\" }\n",
+            "line 6, column 4: unknown function \"sinn\"",
+        ),
+        (
             "[states]\nh = { rate = \"1\", nois = 1 }\n",
             "line 4, column 19: unknown key \"nois\" (did you mean \"noise\"?)",
         ),

@@ -325,6 +325,7 @@ fn unknown_key(key: &str, signals: Option<&Signals>) -> String {
 mod tests {
     use super::super::channels;
     use super::*;
+    use crate::record::{Drive, Record, RecordReader, Signal};
 
     fn names(columns: &str, header: &str) -> Result<Vec<String>, String> {
         let signals = Signals {
@@ -354,6 +355,8 @@ mod tests {
     /// Whatever the channels are called, the reader takes the columns of the header for the channels that they are written from.
     #[test]
     fn a_header_is_read_as_it_was_written() {
+        let place = tempfile::tempdir().unwrap();
+        let [path, moved] = ["r.csv", "read.csv"].map(|name| place.path().join(name));
         let pool = [
             "u", "u0", "u1", "u2", "u3", "u01", "y", "y0", "y1", "y2", "y3", "y01", "t", "a", "b",
             "a,b", " a", "",
@@ -393,6 +396,20 @@ mod tests {
                 let read: Vec<String> = read.unwrap().into_iter().flatten().collect();
                 assert_eq!(read, expected, "{signals:?}: {written:?}");
             }
+            let value = |k: usize, j: usize| (10 * j + k) as f64;
+            let inputs = Signal::from_shape_fn((3, signals.inputs.len()), |(k, j)| value(k, j));
+            let outputs = Signal::from_shape_fn((3, signals.outputs.len()), |(k, j)| -value(k, j));
+            let record = Record::new(Drive::new(0.5, inputs).unwrap(), outputs).unwrap();
+            record.write_for(&path, &signals).unwrap();
+            std::fs::rename(&path, &moved).unwrap();
+            let mut reader = RecordReader::new(Columns::default(), Some(signals.clone()));
+            let read = reader.record(&moved).unwrap();
+            assert_eq!(
+                read.drive().inputs(),
+                record.drive().inputs(),
+                "{signals:?}"
+            );
+            assert_eq!(read.outputs(), record.outputs(), "{signals:?}");
         }
         assert!(own > 100, "only {own} headers need names of their own");
     }

@@ -23,6 +23,7 @@ pub(super) fn with_rows<T>(
     read: impl FnOnce(&mut dyn Read) -> Result<T, RecordError>,
 ) -> Result<T, RecordError> {
     use crate::storage::reading::{note_whole, open};
+    use crate::storage::untrusted::excerpt;
     use parquet::file::reader::{FileReader, SerializedFileReader};
 
     let unread = |error| RecordError::io(path, error);
@@ -34,9 +35,21 @@ pub(super) fn with_rows<T>(
     let reader = SerializedFileReader::new(file.try_clone().map_err(unread)?).map_err(wrong)?;
     let schema = reader.metadata().file_metadata().schema_descr();
     let (mut names, mut units) = (vec![], vec![]);
+    let durations = times::durations(reader.metadata().file_metadata());
     for column in schema.columns() {
-        names.push(format!("\"{}\"", column.name().replace('"', "\"\"")));
-        units.push(times::unit(column).map_err(|problem| RecordError::file(path, problem))?);
+        let name = &column.path().parts()[0];
+        // One that holds lists or tables has a part for each of their entries; a row has one cell.
+        if column.path().parts().len() > 1 && names.last() == Some(&quoted(name)) {
+            continue;
+        }
+        let unit = match durations.get(name) {
+            Some(unit) => Ok(Some(*unit)),
+            None => times::unit(column),
+        };
+        let wrong =
+            |problem| RecordError::file(path, format!("column {} {problem}", excerpt(name)));
+        units.push(unit.map_err(wrong)?);
+        names.push(quoted(name));
     }
     let header = names.join(",") + "\n";
     let rows = reader.get_row_iter(None).map_err(wrong)?;
@@ -59,8 +72,8 @@ pub(super) fn with_rows<T>(
 #[cfg(feature = "parquet")]
 struct Text<I> {
     rows: I,
-    /// Nanoseconds that a count of a column of times stands for.
-    units: Vec<Option<i128>>,
+    /// Meaning of the counts of columns of times.
+    units: Vec<Option<times::Unit>>,
     row: Vec<u8>,
     /// Bytes of the row that were read.
     given: usize,
@@ -91,19 +104,26 @@ where
     }
 }
 
+/// A cell of CSV with any text.
 #[cfg(feature = "parquet")]
-fn line(row: &parquet::record::Row, units: &[Option<i128>]) -> String {
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+#[cfg(feature = "parquet")]
+fn line(row: &parquet::record::Row, units: &[Option<times::Unit>]) -> String {
     use parquet::record::Field;
 
-    let cell = |((_, field), unit): ((&String, &Field), &Option<i128>)| {
-        let stamp = unit.and_then(|unit| times::stamp(field, unit));
-        stamp.unwrap_or_else(|| match field {
+    let cell = |((_, field), unit): ((&String, &Field), &Option<times::Unit>)| {
+        let time = unit.and_then(|unit| unit.cell(field));
+        time.unwrap_or_else(|| match field {
             // With an exponent where it is very large or small.
             Field::Double(value) => format!("{value:?}"),
             Field::Float(value) => format!("{:?}", f64::from(*value)),
             Field::Null => String::new(),
             // Anything else that is no number is named by the checks of a cell.
-            other => other.to_string().replace([',', '\n', '"'], " "),
+            Field::Str(text) => quoted(text),
+            other => quoted(&other.to_string()),
         })
     };
     let cells: Vec<String> = row.get_column_iter().zip(units).map(cell).collect();
@@ -114,20 +134,50 @@ fn line(row: &parquet::record::Row, units: &[Option<i128>]) -> String {
 #[cfg(feature = "parquet")]
 mod times {
     use crate::setting::number;
-    use crate::storage::untrusted::excerpt;
     use jiff::Timestamp;
     use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
+    use parquet::file::metadata::FileMetaData;
     use parquet::record::Field;
     use parquet::schema::types::ColumnDescriptor;
+    use serde_json::Value;
+    use std::collections::HashMap;
     use std::time::Duration;
 
-    /// Nanoseconds of a count; `None` of a column that holds no times. Those of INT96 lose what is below a millisecond, and are refused.
-    pub(super) fn unit(column: &ColumnDescriptor) -> Result<Option<i128>, String> {
+    /// Meaning of a count, in nanoseconds.
+    #[derive(Debug, Clone, Copy)]
+    pub(super) enum Unit {
+        /// A time of the calendar, or of a day.
+        Stamp(i128),
+        /// A duration.
+        Duration(f64),
+    }
+
+    /// Returns the columns of durations that pandas has written; the types of Parquet have none.
+    pub(super) fn durations(file: &FileMetaData) -> HashMap<String, Unit> {
+        let told = (file.key_value_metadata().into_iter().flatten())
+            .find(|entry| entry.key == "pandas")
+            .and_then(|entry| serde_json::from_str::<Value>(entry.value.as_deref()?).ok());
+        let columns = told.as_ref().and_then(|told| told["columns"].as_array());
+        let duration = |column: &Value| {
+            let nanoseconds = match column["numpy_type"].as_str()? {
+                "timedelta64[s]" => 1e9,
+                "timedelta64[ms]" => 1e6,
+                "timedelta64[us]" => 1e3,
+                "timedelta64[ns]" => 1.0,
+                _ => return None,
+            };
+            let name = column["field_name"].as_str()?;
+            Some((name.to_owned(), Unit::Duration(nanoseconds)))
+        };
+        columns.into_iter().flatten().filter_map(duration).collect()
+    }
+
+    /// Returns what a count stands for; `None` of a column that holds no times. Those of INT96 lose what is below a millisecond, and are refused.
+    pub(super) fn unit(column: &ColumnDescriptor) -> Result<Option<Unit>, String> {
         let unit = match (column.logical_type_ref(), column.converted_type()) {
             _ if column.physical_type() == Type::INT96 => {
-                let name = excerpt(column.name());
                 let remedy = "save it as a timestamp of milliseconds, microseconds or nanoseconds";
-                return Err(format!("column {name} is of the old type INT96; {remedy}"));
+                return Err(format!("is of the old type INT96; {remedy}"));
             }
             (Some(LogicalType::Timestamp(of)), _) => of_unit(&of.unit),
             (Some(LogicalType::Time(of)), _) => of_unit(&of.unit),
@@ -140,7 +190,7 @@ mod times {
             (_, ConvertedType::DATE) => Duration::from_hours(24),
             _ => return Ok(None),
         };
-        Ok(Some(unit.as_nanos().cast_signed()))
+        Ok(Some(Unit::Stamp(unit.as_nanos().cast_signed())))
     }
 
     fn of_unit(unit: &TimeUnit) -> Duration {
@@ -151,18 +201,26 @@ mod times {
         }
     }
 
-    /// A time as text that is exact, of a day or of the first of 1970; `None` of a cell that is no count.
-    pub(super) fn stamp(field: &Field, unit: i128) -> Option<String> {
-        let count = match *field {
-            Field::Long(n)
-            | Field::TimestampMillis(n)
-            | Field::TimestampMicros(n)
-            | Field::TimeMicros(n) => i128::from(n),
-            Field::Int(n) | Field::TimeMillis(n) | Field::Date(n) => i128::from(n),
-            _ => return None,
-        };
-        let stamp = Timestamp::from_nanosecond(count * unit).map(|stamp| stamp.to_string());
-        Some(stamp.unwrap_or_else(|_| format!("{} beyond the calendar", number(count as f64))))
+    impl Unit {
+        /// Returns a time as text that is exact, of a day or of the first of 1970, and a duration in seconds; `None` of a cell that is no count.
+        pub fn cell(self, field: &Field) -> Option<String> {
+            let count = match *field {
+                Field::Long(n)
+                | Field::TimestampMillis(n)
+                | Field::TimestampMicros(n)
+                | Field::TimeMicros(n) => n,
+                Field::Int(n) | Field::TimeMillis(n) | Field::Date(n) => n.into(),
+                _ => return None,
+            };
+            match self {
+                Self::Duration(unit) => Some(format!("{:?}", count as f64 * unit / 1e9)),
+                Self::Stamp(unit) => {
+                    let stamp = Timestamp::from_nanosecond(i128::from(count) * unit);
+                    let beyond = |_| format!("{} beyond the calendar", number(count as f64));
+                    Some(stamp.map_or_else(beyond, |stamp| stamp.to_string()))
+                }
+            }
+        }
     }
 }
 
@@ -170,17 +228,22 @@ mod times {
 mod tests {
     use crate::record::{Record, RecordError};
     use parquet::data_type::{DataType, DoubleType, Int64Type};
+    use parquet::file::metadata::KeyValue;
+    use parquet::file::properties::WriterProperties;
     use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
     use parquet::schema::parser::parse_message_type;
     use std::path::Path;
     use std::sync::Arc;
 
-    /// A file with these times of this type and outputs.
-    fn write(path: &Path, kind: &str, t: &[i64], y: &[f64]) {
+    /// A file with these times of this type and outputs, and what pandas tells of it.
+    fn write(path: &Path, kind: &str, t: &[i64], y: &[f64], pandas: Option<&str>) {
         let schema = format!("message m {{ required int64 t{kind}; required double y; }}");
         let schema = Arc::new(parse_message_type(&schema).unwrap());
         let file = std::fs::File::create(path).unwrap();
-        let mut writer = SerializedFileWriter::new(file, schema, Arc::default()).unwrap();
+        let told = pandas.map(|text| vec![KeyValue::new("pandas".into(), Some(text.into()))]);
+        let properties = WriterProperties::builder().set_key_value_metadata(told);
+        let properties = Arc::new(properties.build());
+        let mut writer = SerializedFileWriter::new(file, schema, properties).unwrap();
         let mut group = writer.next_row_group().unwrap();
         column::<Int64Type>(&mut group, t);
         column::<DoubleType>(&mut group, y);
@@ -197,8 +260,56 @@ mod tests {
     fn read(kind: &str, t: &[i64], y: &[f64]) -> Result<Record, RecordError> {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("r.parquet");
-        write(&path, kind, t, y);
+        write(&path, kind, t, y, None);
         Record::read(&path)
+    }
+
+    #[test]
+    fn durations_of_pandas_are_seconds() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("r.parquet");
+        let told = r#"{"columns": [{"name": "t", "field_name": "t", "numpy_type": "timedelta64[ms]"}, {"name": "y"}]}"#;
+        write(&path, "", &[0, 250, 500], &[1.0, 2.0, 3.0], Some(told));
+        assert_eq!(Record::read(&path).unwrap().drive().dt(), 0.25);
+    }
+
+    #[test]
+    fn cells_that_are_no_number_are_told_by_column_and_text() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("r.parquet");
+        for (kind, cell) in [
+            (
+                "required group y (LIST) { repeated group list { required double element; } }",
+                "[0.5]",
+            ),
+            (
+                "required group y { required double a; required double b; }",
+                "{a: 0.5, b: 0.5}",
+            ),
+        ] {
+            let schema = format!("message m {{ required int64 t; {kind} }}");
+            let schema = Arc::new(parse_message_type(&schema).unwrap());
+            let file = std::fs::File::create(&path).unwrap();
+            let mut writer =
+                SerializedFileWriter::new(file, schema.clone(), Arc::default()).unwrap();
+            let mut group = writer.next_row_group().unwrap();
+            column::<Int64Type>(&mut group, &[0, 1]);
+            for _ in 1..schema.get_fields().len() + usize::from(cell.contains('b')) {
+                let mut column = group.next_column().unwrap().unwrap();
+                let levels = cell.starts_with('[').then_some(&[1, 1][..]);
+                let begins = cell.starts_with('[').then_some(&[0, 0][..]);
+                (column
+                    .typed::<DoubleType>()
+                    .write_batch(&[0.5, 0.5], levels, begins))
+                .unwrap();
+                column.close().unwrap();
+            }
+            group.close().unwrap();
+            writer.close().unwrap();
+            let error = Record::read(&path).unwrap_err().to_string();
+            let expected = format!("row 2, column y: \"{cell}\" is no finite number");
+            assert!(error.contains(&expected), "{error}");
+        }
     }
 
     #[test]

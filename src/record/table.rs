@@ -258,7 +258,7 @@ impl CellParser {
             Some(value) if value.abs() <= LARGEST => Ok(value),
             Some(value) if value.is_finite() => Err(format!(
                 "{} is beyond ±{LARGEST:e}, the largest value of a record; correct or remove the row",
-                excerpt(cell)
+                number(value)
             )),
             None if cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
                 Err(format!(

@@ -29,8 +29,9 @@ impl<'a> Text<'a> {
         let mut reader = BufReader::new(decoder);
         let mut start = Vec::new();
         let mut header = 0..0;
-        // Empty lines before the header are none.
-        while start[header.clone()].trim_ascii().is_empty() {
+        // Empty lines and comments before the header are none.
+        let is_none = |line: &[u8]| line.is_empty() || line[0] == b'#';
+        while is_none(start[header.clone()].trim_ascii()) {
             let before = start.len();
             let left = MOST_START.saturating_sub(before as u64);
             if reader.by_ref().take(left).read_until(b'\n', &mut start)? == 0 {
@@ -57,11 +58,15 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Returns the most frequent separator of a header, outside quotes.
-fn separator(header: &[u8]) -> u8 {
+/// Returns the most frequent separator of a header, outside quotes; lines may end with a carriage return alone.
+fn separator(text: &[u8]) -> u8 {
     let mut counts = SEPARATORS.map(|(byte, _)| (byte, 0));
     let mut is_quoted = false;
-    for byte in header {
+    let is_end = |byte: &u8| matches!(byte, b'\r' | b'\n');
+    for byte in text.iter().skip_while(|byte| is_end(byte)) {
+        if is_end(byte) && !is_quoted {
+            break;
+        }
         is_quoted ^= *byte == b'"';
         if let Some((_, count)) = counts.iter_mut().find(|(b, _)| b == byte)
             && !is_quoted
@@ -167,6 +172,8 @@ mod tests {
             ("t\n", b','),
             ("", b','),
             ("t,a;y\n", b';'),
+            ("# a, b, c\n\nt;y\n", b';'),
+            ("\rt;u;y\r0,5;1,5;2,5\r1,0;1,0;2,0\r", b';'),
         ] {
             assert_eq!(decoded(header.as_bytes()).1, expected, "{header}");
         }

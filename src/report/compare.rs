@@ -78,12 +78,19 @@ pub(crate) fn compare_document(all: &[ComparedStudy], what: &str) -> Document {
         ("free run", Number),
         ("", Text),
     ];
-    let best = all
-        .iter()
-        .max_by(|a, b| a.score.log_score.total_cmp(&b.score.log_score));
-    let headline = best.map_or(String::new(), |best| {
-        format!("{} predicts best: highest log score {what}.", best.name)
-    });
+    let highest = (all.iter().map(|own| own.score.log_score)).max_by(f64::total_cmp);
+    // A difference that the table does not show is none.
+    let is_best = |own: &&ComparedStudy| {
+        highest.is_some_and(|highest| short(own.score.log_score) == short(highest))
+    };
+    let best: Vec<&str> = (all.iter().filter(is_best).map(|own| own.name.as_str())).collect();
+    let headline = match &best[..] {
+        [best] => format!("{best} predicts best: highest log score {what}."),
+        tied => format!(
+            "{} predict equally well: the same log score {what}.",
+            tied.join(" and ")
+        ),
+    };
     Document {
         title: "Studies on one record".into(),
         answer: vec![

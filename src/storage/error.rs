@@ -47,6 +47,14 @@ pub enum StorageError {
         /// Where the result is.
         kept: PathBuf,
     },
+    /// A finished result that cannot be written to its place.
+    #[error("{problem}; the result is in {}", kept.display())]
+    Elsewhere {
+        /// Why it cannot.
+        problem: String,
+        /// Where the result is.
+        kept: PathBuf,
+    },
     /// A path that a file keeps as text, which it is not.
     #[error("{}: this path is kept in a file as text, and is no UTF-8; rename it", .0.display())]
     NoText(PathBuf),

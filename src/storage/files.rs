@@ -4,8 +4,9 @@ use super::StorageError;
 pub(crate) use super::error::with_remedy;
 use super::names::places_beside;
 use super::unfinished::{Unfinished, file_beside, note_result};
+use std::fmt::Display;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 /// Writes a new file.
@@ -14,29 +15,53 @@ pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.map(|_| ()).map_err(|error| error.error)
 }
 
-/// Writes a result whose place was free when the work began. What has taken it since stays: the result is kept beside it, which the error
-/// says.
-pub(crate) fn write_result<E: From<StorageError>>(
+/// Writes a result whose place was free when the work began. What has taken it since stays: the result is kept beside it, or elsewhere where
+/// nothing can be written, which the error says.
+pub(crate) fn write_result<E: From<StorageError> + Display>(
     place: &Path,
     write: impl Fn(&Path) -> Result<(), E>,
 ) -> Result<(), E> {
-    let is_free = |path: &Path| path.symlink_metadata().is_err();
-    let written = write(place);
-    if written.is_ok() {
+    let Err(error) = write(place) else {
         note_result(place);
-        return written;
+        return Ok(());
+    };
+    let is_taken = !is_free(place);
+    let kept = match is_taken {
+        true => places_beside(place).find(|path| is_free(path) && write(path).is_ok()),
+        false => places_elsewhere(place).find(|path| write(path).is_ok()),
+    };
+    let Some(kept) = kept else {
+        return Err(error);
+    };
+    note_result(&kept);
+    let (place, problem) = (place.into(), error.to_string());
+    Err(match is_taken {
+        true => StorageError::Kept { place, kept },
+        false => StorageError::Elsewhere { problem, kept },
     }
-    if is_free(place) {
-        return written;
-    }
-    let kept = places_beside(place).find(|path| is_free(path) && write(path).is_ok());
-    match kept {
-        None => written,
-        Some(kept) => {
-            let place = place.into();
-            Err(StorageError::Kept { place, kept }.into())
-        }
-    }
+    .into())
+}
+
+fn is_free(path: &Path) -> bool {
+    path.symlink_metadata().is_err()
+}
+
+/// Places for a file that cannot be written where it is due, which are free: in the folder of the call, then in that of temporary files.
+fn places_elsewhere(place: &Path) -> impl Iterator<Item = PathBuf> {
+    let name = place.file_name().unwrap_or_default();
+    let there = [PathBuf::new(), std::env::temp_dir()].map(|folder| folder.join(name));
+    there.into_iter().filter_map(|path| match is_free(&path) {
+        true => Some(path),
+        false => places_beside(&path).find(|path| is_free(path)),
+    })
+}
+
+/// Keeps the text of an answer whose files could not be written; returns where.
+pub(crate) fn keep_elsewhere(name: &str, text: &str) -> Option<PathBuf> {
+    let is_written = |path: &PathBuf| write_new(path, text.as_bytes()).is_ok();
+    let kept = places_elsewhere(name.as_ref()).find(is_written)?;
+    note_result(&kept);
+    Some(kept)
 }
 
 /// Writes a file, in place of an existing one.

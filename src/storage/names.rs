@@ -39,6 +39,17 @@ pub(super) fn is_unfinished(name: &str) -> bool {
             .is_some_and(|(process, random)| is_number(process) && is_random(random))
 }
 
+/// Tells whether the name of an unfinished file is that of another process which lives.
+pub(super) fn is_of_another(name: &str) -> bool {
+    let rest = name.strip_prefix(UNFINISHED).unwrap_or_default();
+    let process = rest
+        .split_once('-')
+        .and_then(|(process, _)| process.parse().ok());
+    // Where the system lists its processes.
+    let lives = |process: u32| Path::new("/proc").join(process.to_string()).exists();
+    process.is_some_and(|process| process != std::process::id() && lives(process))
+}
+
 /// The places beside one that is taken: `out-2`, `out-3`, … for `out`, `r-2.csv`, … for `r.csv`.
 pub(super) fn places_beside(place: &Path) -> impl Iterator<Item = PathBuf> {
     let [stem, ending] = [place.file_stem(), place.extension()].map(Option::unwrap_or_default);

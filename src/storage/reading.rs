@@ -1,32 +1,47 @@
 //! Files of a call as they are read, with the checksums of the bytes that were read.
 //!
 //! A result names its files by checksums. These are taken while a file is read, not afterwards: the file may be a pipe, or another one by
-//! then. One entry is kept for each path.
+//! then. One entry is kept for each path. What comes from a pipe is kept on the disk: a call may read a file several times.
 
-use super::checksum::Hashing;
+use super::checksum::{Hashing, sha256_of};
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Checksums of the files that this process has read, by path; none for a pipe that is being read.
-static READ: Mutex<BTreeMap<PathBuf, Option<String>>> = Mutex::new(BTreeMap::new());
+/// Checksums of the files that this process has read, by path.
+static READ: Mutex<BTreeMap<PathBuf, String>> = Mutex::new(BTreeMap::new());
+/// Bytes that came from pipes, by path; none where a pipe is not at its end, or where there was no room for them.
+static PIPES: Mutex<BTreeMap<PathBuf, Option<File>>> = Mutex::new(BTreeMap::new());
 
-fn read_files() -> MutexGuard<'static, BTreeMap<PathBuf, Option<String>>> {
-    READ.lock().unwrap_or_else(PoisonError::into_inner)
+fn held<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Returns the SHA-256 of the bytes that were last read from a path, from its begin to its end.
 pub(crate) fn checksum_of_read(path: &Path) -> Option<String> {
-    read_files().get(path).cloned().flatten()
+    held(&READ).get(path).cloned()
 }
 
-/// Opens a file for reading; says so where a link leads nowhere, and where a pipe was read before: its bytes are gone.
+/// Returns whether a file has other bytes than were read, or is gone. Clocks are not asked.
+pub(crate) fn has_changed(path: &Path) -> bool {
+    let is_file = path.metadata().map_or(true, |data| data.is_file());
+    is_file && checksum_of_read(path).is_some_and(|read| sha256_of(path).ok() != Some(read))
+}
+
+/// Opens a file for reading, or what a pipe has given; says so where a link leads nowhere, and where the bytes of a pipe are gone.
 pub(crate) fn open(path: &Path) -> io::Result<File> {
-    if is_pipe(path) && read_files().insert(path.into(), None).is_some() {
-        let text = "it is a pipe, which can be read once";
-        return Err(io::Error::new(io::ErrorKind::NotSeekable, text));
+    if is_pipe(path)
+        && let Some(kept) = held(&PIPES).get(path)
+    {
+        let Some(kept) = kept else {
+            let text = "it is a pipe, which can be read once";
+            return Err(io::Error::new(io::ErrorKind::NotSeekable, text));
+        };
+        let mut file = kept.try_clone()?;
+        file.seek(SeekFrom::Start(0))?;
+        return Ok(file);
     }
     File::open(path).map_err(|error| match dangling(path) {
         Some(to) => {
@@ -38,7 +53,7 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
 }
 
 /// Returns whether what is read from a path is gone then.
-fn is_pipe(path: &Path) -> bool {
+pub(crate) fn is_pipe(path: &Path) -> bool {
     #[cfg(unix)]
     {
         use std::os::unix::fs::FileTypeExt;
@@ -65,15 +80,23 @@ pub(crate) struct Reading {
     file: File,
     path: PathBuf,
     hash: Hashing,
+    /// Keeps what a pipe gives, in a file without a name.
+    kept: Option<File>,
 }
 
 impl Reading {
     /// Opens a file.
     pub fn open(path: &Path) -> io::Result<Self> {
+        let file = open(path)?;
+        let is_new = is_pipe(path) && !held(&PIPES).contains_key(path);
+        if is_new {
+            held(&PIPES).insert(path.into(), None);
+        }
         Ok(Self {
-            file: open(path)?,
+            file,
             path: path.into(),
             hash: Hashing::default(),
+            kept: is_new.then(tempfile::tempfile).and_then(Result::ok),
         })
     }
 
@@ -87,10 +110,14 @@ impl Read for Reading {
     fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
         let read = self.file.read(to)?;
         self.hash.add(&to[..read]);
+        self.kept = (self.kept.take()).filter(|mut kept| kept.write_all(&to[..read]).is_ok());
         if read == 0 && !to.is_empty() {
+            if let Some(kept) = self.kept.take() {
+                held(&PIPES).insert(self.path.clone(), Some(kept));
+            }
             // A reader may ask again behind the end.
             let sum = self.hash.clone().finish();
-            read_files().insert(self.path.clone(), Some(sum));
+            held(&READ).insert(self.path.clone(), sum);
         }
         Ok(read)
     }
@@ -102,7 +129,7 @@ pub(crate) fn note_whole(path: &Path, file: &File) -> io::Result<()> {
     file.seek(SeekFrom::Start(0))?;
     let mut hash = Hashing::default();
     hash.add_all(&mut file)?;
-    read_files().insert(path.into(), Some(hash.finish()));
+    held(&READ).insert(path.into(), hash.finish());
     Ok(())
 }
 
@@ -121,11 +148,16 @@ mod tests {
         let mut reading = Reading::open(&path).unwrap();
         reading.read_to_string(&mut text).unwrap();
         assert_eq!(reading.read(&mut [0; 8]).unwrap(), 0);
+        assert!(!has_changed(&path));
         std::fs::write(&path, "second").unwrap();
         assert_eq!(checksum_of_read(&path), Some(sha256(b"first")));
+        assert!(has_changed(&path));
         let file = open(&path).unwrap();
         note_whole(&path, &file).unwrap();
         assert_eq!(checksum_of_read(&path), Some(sha256(b"second")));
+        assert!(!has_changed(&path));
+        std::fs::remove_file(&path).unwrap();
+        assert!(has_changed(&path));
         assert_eq!(checksum_of_read(&place.path().join("other")), None);
     }
 
@@ -142,7 +174,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_pipe_is_read_once() {
+    fn what_a_pipe_has_given_can_be_read_again() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&path).status();
@@ -153,12 +185,14 @@ mod tests {
             let path = path.clone();
             std::thread::spawn(move || std::fs::write(path, "t,y\n").unwrap())
         };
-        let mut text = String::new();
-        let mut reading = Reading::open(&path).unwrap();
-        reading.read_to_string(&mut text).unwrap();
+        for _ in 0..2 {
+            let mut text = String::new();
+            let mut reading = Reading::open(&path).unwrap();
+            reading.read_to_string(&mut text).unwrap();
+            assert_eq!(text, "t,y\n");
+            assert_eq!(checksum_of_read(&path), Some(sha256(b"t,y\n")));
+            assert!(!has_changed(&path));
+        }
         writer.join().unwrap();
-        assert_eq!(checksum_of_read(&path), Some(sha256(b"t,y\n")));
-        let again = Reading::open(&path).map(|_| ()).unwrap_err();
-        assert!(again.to_string().contains("can be read once"), "{again}");
     }
 }

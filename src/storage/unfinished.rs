@@ -7,7 +7,7 @@
 
 use super::StorageError;
 use super::error::folder;
-use super::names::{is_unfinished, named, places_beside, prefix};
+use super::names::{is_of_another, is_unfinished, named, places_beside, prefix};
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -137,7 +137,9 @@ pub(super) fn sweep(place: &Path) {
         return;
     };
     for entry in entries.flatten() {
-        if entry.file_name().to_str().is_some_and(is_unfinished) {
+        let name = entry.file_name();
+        let is_ours = |name: &str| is_unfinished(name) && !is_of_another(name);
+        if name.to_str().is_some_and(is_ours) {
             remove_abandoned(&entry.path());
         }
     }
@@ -306,7 +308,10 @@ impl NewFolder {
                 }
                 Ok(())
             }
-            Some(kept) => Err(StorageError::Kept { place, kept }),
+            Some(kept) => {
+                note_result(&kept);
+                Err(StorageError::Kept { place, kept })
+            }
         }
     }
 }

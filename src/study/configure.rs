@@ -199,10 +199,22 @@ impl Study {
 
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
         let mut named = library.only.iter().chain(&library.without);
-        let unknown = named.find(|name| !self.knows_effect(name));
-        unknown.map_or(Ok(()), |name| {
-            Err(StudyError::UnknownEffect(self.with_nearest_effect(name)))
-        })
+        if let Some(unknown) = named.find(|name| !self.knows_effect(name)) {
+            return Err(StudyError::UnknownEffect {
+                name: unknown.as_str().into(),
+                near: self.nearest_effect(unknown),
+            });
+        }
+        // Which effects a twin can have is asked of it: of a program, too.
+        let lets_any = || {
+            self.effects()
+                .iter()
+                .any(|effect| library.lets(effect.key()))
+        };
+        match library.only.is_empty() || lets_any() {
+            true => Ok(()),
+            false => Err(StudyError::NoEffects),
+        }
     }
 }
 
@@ -332,7 +344,21 @@ mod tests {
             ("[fixed]\nk7 = 1.0", 3, "fixed: no parameter is called k7"),
             ("[noise]\ny = 0.1\nh1 = nan", 4, "noise h1 = NaN"),
             ("[start]\nh9 = 1.0", 3, "start names h9"),
-            ("[library]\nonly = ['foo']", 2, "library: foo"),
+            (
+                "[library]\n\nwithout = [\n'sensor-lag',\n'foo']",
+                6,
+                "library: foo",
+            ),
+            (
+                "[library]\nonly = ['sensor-lag@sensor']\nwithout = ['sensor-lag']",
+                3,
+                "library: without names all of only",
+            ),
+            (
+                "[start]\nh1 = { value = 1.0, at = 0.0 }\nh2 = { value = 1.0, at = -2.0 }",
+                4,
+                "start h2: at = -2, and 0 for another state",
+            ),
         ] {
             let expected = format!("s.toml, line {line}: {problem}");
             let message = refused(tables);

@@ -89,8 +89,16 @@ pub enum StudyError {
     #[error("all parameters are fixed, nothing is left to estimate; free one")]
     AllFixed,
     /// The library of a study names an unknown effect.
-    #[error("library: {0} is no effect of this twin; correct or remove it")]
-    UnknownEffect(String),
+    #[error("library: {name}{near} is no effect of this twin; correct or remove it")]
+    UnknownEffect {
+        /// Name in the file.
+        name: String,
+        /// Name that may be meant, in brackets.
+        near: String,
+    },
+    /// The library of a study leaves no effect.
+    #[error("library: without names all of only, so that nothing is left; remove one of the two")]
+    NoEffects,
     /// Step, length or input of simulated records are wrong.
     #[error("{0}")]
     Plan(String),
@@ -205,8 +213,10 @@ impl StudyError {
             | Self::Adaptation(TwinError::Value { table, name, .. })
             | Self::Twice { table, name } => (table, name),
             Self::Adaptation(TwinError::Parameter { name, .. }) => ("prior", name),
+            Self::Adaptation(TwinError::Begins { name, .. }) => ("start", name),
             Self::Fixed { name, .. } => ("fixed", name),
-            Self::UnknownEffect(_) => ("library", ""),
+            Self::UnknownEffect { name, .. } => ("library", name),
+            Self::NoEffects => ("library", "only"),
             Self::Record(RecordError::Step(_)) => ("record", "step"),
             // These begin with the key.
             Self::Plan(problem) => ("record", problem.split([' ', ':']).next()?),

@@ -264,13 +264,18 @@ impl StudyFile {
     }
 }
 
-/// Returns where a value of a table stands in a file.
+/// Returns where a value of a table stands in a file, or a name in one of its lists.
 fn value_of(file: &Spanned<DeTable<'_>>, table: &str, name: &str) -> Option<usize> {
     let table = file.get_ref().get(table)?;
     // Names may be dotted.
     let value = (table.get_ref().get(name))
         .or_else(|| (name.split('.')).try_fold(table, |at, key| at.get_ref().get(key)));
-    value.map(|value| value.span().start)
+    let entries = table.get_ref().as_table()?.values();
+    let listed = || {
+        let mut lists = entries.filter_map(|value| value.get_ref().as_array());
+        lists.find_map(|list| list.iter().find(|of| of.get_ref().as_str() == Some(name)))
+    };
+    value.or_else(listed).map(|value| value.span().start)
 }
 
 /// Returns how many lines below the first one of a table the key stands that a message is about, of which the parser tells the table alone:

@@ -262,14 +262,14 @@ impl Study {
     }
 
     /// Adds to the name of an unknown effect the known one that is nearest.
-    pub(crate) fn with_nearest_effect(&self, pattern: &EffectPattern) -> String {
+    pub(crate) fn nearest_effect(&self, pattern: &EffectPattern) -> String {
         let effects = self.effects();
         let name = pattern.as_str();
         let known = effects.iter().map(|e| match name.parse::<EffectKey>() {
             Ok(_) => e.key().to_string(),
             Err(_) => e.id().to_owned(),
         });
-        format!("{name}{}", did_you_mean(name, known))
+        did_you_mean(name, known)
     }
 
     /// Returns all effects that this program knows.
@@ -284,14 +284,9 @@ impl Study {
 
     /// Returns what the twin may lack: those of [`Study::effects`] that `[library]` lets through.
     pub fn candidates(&self) -> Vec<Effect> {
-        let Library { only, without } = &self.file.library;
-        let named = |list: &[EffectPattern], effect: &Effect| {
-            list.iter().any(|pattern| pattern.matches(effect.key()))
-        };
-        (self.effects().into_iter())
-            .filter(|effect| only.is_empty() || named(only, effect))
-            .filter(|effect| !named(without, effect))
-            .collect()
+        let mut all = self.effects();
+        all.retain(|effect| self.file.library.lets(effect.key()));
+        all
     }
 
     /// A record to show the program on, and its setting.

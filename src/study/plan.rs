@@ -106,7 +106,9 @@ impl RecordPlan {
         let channels = signals.inputs.len();
         let all = channels + signals.outputs.len();
         let samples = self.samples;
-        let problem = if samples > MOST_SAMPLES {
+        let problem = if samples == 0 {
+            Some("samples = 0; at least one is needed".into())
+        } else if samples > MOST_SAMPLES {
             Some(format!(
                 "samples = {samples}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record"
             ))

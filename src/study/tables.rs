@@ -1,6 +1,6 @@
 //! Tables of a study file.
 
-use crate::effect::EffectPattern;
+use crate::effect::{EffectKey, EffectPattern};
 use crate::record::Columns;
 use crate::study::input_plan::PlannedInputs;
 use crate::twin::{Hold, Integrator, Interval};
@@ -76,6 +76,12 @@ fn some_patterns<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<EffectPattern
 impl Library {
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Returns whether a diagnosis may name this effect.
+    pub fn lets(&self, key: &EffectKey) -> bool {
+        let named = |list: &[EffectPattern]| list.iter().any(|pattern| pattern.matches(key));
+        (self.only.is_empty() || named(&self.only)) && !named(&self.without)
     }
 }
 

@@ -71,6 +71,20 @@ pub enum TwinError {
         /// Remedy.
         remedy: &'static str,
     },
+    /// States that start at different times.
+    #[error(
+        "start {name}: at = {}, and {} for another state; give all the same at, or one of them alone",
+        number(*at),
+        number(*other)
+    )]
+    Begins {
+        /// State.
+        name: String,
+        /// Its time, in seconds.
+        at: f64,
+        /// Time of a state before it.
+        other: f64,
+    },
     /// An unknown start or noise level without a prior.
     #[error("no prior for the unknown {0}; give it one, from low to high")]
     NoPrior(String),

@@ -10,7 +10,7 @@ use std::process::{Command, Output, Stdio};
 const TRUETWIN: &str = env!("CARGO_BIN_EXE_truetwin");
 
 /// Runs a script as a root who has nothing but mounts of its own; `None` where the system does not let us.
-fn in_name_space(folder: &Path, script: &str) -> Option<Output> {
+pub(crate) fn in_name_space(folder: &Path, script: &str) -> Option<Output> {
     let unshare = |script: &str| {
         Command::new("unshare")
             .args(["--user", "--map-root-user", "--mount", "sh", "-euc", script])
@@ -109,6 +109,51 @@ fn a_full_disk_is_said_and_leaves_nothing_half_written() {
 fn a_folder_that_cannot_be_written_is_said() {
     let read_only = "mount -t tmpfs -o ro none disk";
     each_writer_says(read_only, &["ead-only", "choose another place"], "");
+}
+
+/// A result is not lost with its disk: the answer is printed, and kept where there is room.
+#[test]
+fn an_answer_without_room_is_kept_elsewhere() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    prepare(at);
+    let full = "mount -t tmpfs -o size=8k none disk; head -c 4096 /dev/zero > disk/all";
+    for (call, kept) in [
+        (
+            "fit r.csv --twin van-der-pol --out disk/it",
+            "truetwin-fit.json",
+        ),
+        (
+            "estimate r.csv --estimator v.est --out disk/it",
+            "truetwin-estimate.json",
+        ),
+        (
+            "simulate --twin van-der-pol --theta nu=1 --out disk/it",
+            "it",
+        ),
+    ] {
+        let script = format!(
+            "{full}; $TRUETWIN {call} > out.txt 2> err.txt && exit 71 || test $? = 2; ls -A disk"
+        );
+        let Some(output) = in_name_space(at, &script) else {
+            return;
+        };
+        assert_eq!(output.stdout, b"all\n", "{call}: {output:?}");
+        let error = fs::read_to_string(at.join("err.txt")).unwrap();
+        assert!(
+            error.contains("make room") && error.trim_end().ends_with(&format!("is in {kept}")),
+            "{error}"
+        );
+        let text = fs::read_to_string(at.join(kept)).unwrap();
+        match kept.ends_with(".json") {
+            true => {
+                serde_json::from_str::<serde_json::Value>(&text).unwrap();
+                let printed = fs::read_to_string(at.join("out.txt")).unwrap();
+                assert!(printed.contains("nu"), "{printed}");
+            }
+            false => assert!(text == fs::read_to_string(at.join("r.csv")).unwrap()),
+        }
+    }
 }
 
 /// The disk fills up in the middle; with more room the same call ends the work, with the bytes of one that was never disturbed.

@@ -8,10 +8,14 @@ mod files;
 mod fuzz;
 mod list;
 mod memory;
+#[cfg(target_os = "linux")]
+mod mixed;
 mod numbers;
 #[cfg(unix)]
 mod places;
 mod security;
+#[cfg(unix)]
+mod signals;
 #[cfg(unix)]
 mod stop;
 #[path = "../common/studies.rs"]

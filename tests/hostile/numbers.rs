@@ -104,13 +104,14 @@ fn lag(parameter: f64, output: f64) -> String {
 
 /// Answers do not depend on the unit of a parameter, where its squares overflow or vanish, either.
 #[test]
-fn parameters_of_any_size_are_estimated_alike() {
+fn parameters_and_outputs_of_any_size_are_estimated_alike() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
     let (mut answers, mut fits) = (vec![], vec![]);
-    for size in [1.0, 1e160, 1e-160, 1e300, 1e-290] {
-        let name = |ending: &str| format!("{size:e}.{ending}");
-        fs::write(at.join(name("toml")), lag(size, 1.0)).unwrap();
+    let sizes = [1.0, 1e160, 1e-160, 1e300, 1e-290].map(|size| (size, 1.0));
+    for (size, output) in sizes.into_iter().chain([(1.0, 1e-90), (1.0, 1e90)]) {
+        let name = |ending: &str| format!("{size:e}-{output:e}.{ending}");
+        fs::write(at.join(name("toml")), lag(size, output)).unwrap();
         let (study, record, estimator) = (name("toml"), name("csv"), name("est"));
         let (theta, study) = (format!("a={size:e}"), ["--study", &study]);
         for (verb, rest) in [
@@ -145,6 +146,7 @@ fn parameters_of_any_size_are_estimated_alike() {
             number(&json["interval"]["low"][0]) / size,
             number(&json["gate"]["p_value"]),
             number(&json["after"]["p_value"]),
+            number(&json["gate"]["statistic"]),
         ]);
     }
     for fit in &fits {
@@ -158,12 +160,13 @@ fn parameters_of_any_size_are_estimated_alike() {
     assert!((value - 1.0).abs() < 0.1, "{answers:?}");
     // The network computes with 32 bits, and is trained on 200 simulations.
     for answer in &answers {
-        let [value, error, low, gate, after] = *answer;
+        let [value, error, low, gate, after, statistic] = *answer;
         let first = &answers[0];
         assert!((value - first[0]).abs() < 0.1 * first[1], "{answers:?}");
         assert!((error / first[1] - 1.0).abs() < 0.05, "{answers:?}");
         assert!((low - first[2]).abs() < 0.2 * first[1], "{answers:?}");
         assert!(gate > 0.1 && after > 0.1, "{answers:?}");
+        assert!((statistic / first[5] - 1.0).abs() < 0.01, "{answers:?}");
     }
 }
 

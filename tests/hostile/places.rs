@@ -76,7 +76,7 @@ fn names_are_bytes() {
     json(&call(at, "fit r.csv --json --study", [&*study]));
 }
 
-/// A pipe works once, and its checksum is that of the bytes that came through it.
+/// A pipe is one record, and its checksum is that of the bytes that came through it.
 #[test]
 fn pipes_are_read_once() {
     let place = with_record();
@@ -113,6 +113,34 @@ fn pipes_are_read_once() {
         "{}",
         told(&twice)
     );
+    // Several studies read one record: what came through the pipe is kept.
+    let writer = feed("r.csv", "pipe");
+    let compared = "compare short.toml short.toml --record r.csv --validation pipe --json";
+    let compared = json(&run(at, compared));
+    writer.join().unwrap().unwrap();
+    assert_eq!(compared["studies"].as_array().unwrap().len(), 2);
+}
+
+/// A file that is another one by the end of the work is told: the answer is of the bytes that were read.
+#[test]
+fn a_file_that_changes_meanwhile_is_told() {
+    let place = with_record();
+    let at = place.path();
+    for (change, words) in [("echo '# more' >> r.csv", true), ("touch r.csv", false)] {
+        let fit =
+            format!("{TRUETWIN} fit r.csv --study short.toml --draws 200000 --out told-{words}");
+        let script = format!("(sleep 0.3; {change}) & {fit}");
+        let output = Command::new("sh")
+            .args(["-c", &script])
+            .current_dir(at)
+            .output()
+            .unwrap();
+        let is_told = told(&output).contains("warning: r.csv has changed since it was read");
+        assert!(
+            output.status.success() && is_told == words,
+            "{change}: {output:?}"
+        );
+    }
 }
 
 /// What begins as our unfinished files do, and is a user's.

@@ -154,6 +154,15 @@ fn a_reproduction_that_is_stopped_says_how_to_go_on() {
 fn work_that_has_kept_nothing_yet_does_not_say_so() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
+    let call = "bank --twin tanks --size 10000000 --threads 1 --out b";
+    let manifest = at.join("b/manifest.json");
+    let said = interrupted(at, call, "-TERM", || manifest.exists());
+    let none = "error: stopped; no piece of the work was finished yet; begin again with: ";
+    assert!(
+        entries(&at.join("b/shards")) > 0 || said.starts_with(none),
+        "{said}"
+    );
+    fs::remove_dir_all(at.join("b")).unwrap();
     let begun = Instant::now();
     let soon = || begun.elapsed() > Duration::from_millis(300);
     let call = "withheld --twin tanks --trials 100000 --out w";

@@ -6,7 +6,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
-from ._simulator import Parameter, Range
+from ._numbers import number, shown
+from ._simulator import Parameter, Range, ranged
 
 #: An expression: a text such as ``"-k*h + u"``, a number, or an expression of sympy.
 Expression = Any
@@ -18,8 +19,13 @@ def _is_sympy(value: Any) -> bool:
     return hasattr(value, "free_symbols") and hasattr(value, "atoms")
 
 
-def expression(value: Expression) -> str | float:
-    """Return an expression as a file has it.
+def is_expression(value: Any) -> bool:
+    """Tell whether a level of noise is no number: a text or an expression of sympy, or keys with these."""
+    return isinstance(value, (str, Mapping)) or _is_sympy(value)
+
+
+def expression(what: str, value: Expression) -> str | float:
+    """Return an expression as a file has it; `what` names it in a message.
 
     Raises
     ------
@@ -30,12 +36,10 @@ def expression(value: Expression) -> str | float:
         return value.replace("**", "^")
     if _is_sympy(value):
         return _sympy(value)
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return float(value)
     try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise TypeError(f"expression of type {type(value).__name__}; give a text, a number or an expression of sympy") from None
+        return number(what, value, "")
+    except ValueError:
+        raise TypeError(f"{what} = {shown(value)}; give a text, a number or an expression of sympy") from None
 
 
 #: Names of the program for functions of sympy.
@@ -101,57 +105,56 @@ def _sympy(value: Any) -> str:
     return written(value)
 
 
-def _value(value: Any) -> str:
-    """Return a value of a TOML file."""
+def _value(what: str, value: Any) -> str:
+    """Return a value of a TOML file; `what` names it in a message."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         # The escapes of JSON are some of TOML's.
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_value(inner)}" for key, inner in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {_value(f'{what}, {key}', inner)}" for key, inner in value.items()) + " }"
     if isinstance(value, Sequence):
-        return "[" + ", ".join(_value(inner) for inner in value) + "]"
-    number = float(value)
-    text = repr(number)
-    return str(int(number)) if isinstance(value, int) else text
+        return "[" + ", ".join(_value(what, inner) for inner in value) + "]"
+    real = number(what, value, "give a number or a text")
+    return str(int(real)) if isinstance(value, int) else repr(real)
 
 
-def _keys(entry: Mapping[str, Any], expressions: Sequence[str]) -> dict[str, Any]:
-    """Return the keys of an entry, expressions of sympy as texts."""
+def _keys(name: str, entry: Mapping[str, Any], expressions: Sequence[str]) -> dict[str, Any]:
+    """Return the keys of the entry `name`, expressions of sympy as texts."""
     keys: dict[str, Any] = {}
     for key, value in entry.items():
         if key in expressions and not isinstance(value, Mapping):
-            keys[key] = [expression(end) for end in value] if key == "limits" else expression(value)
+            what = f"{name}, {key}"
+            keys[key] = [expression(what, end) for end in value] if key == "limits" else expression(what, value)
         elif isinstance(value, Mapping):
-            keys[key] = _keys(value, ("mean", "std", "value"))
+            keys[key] = _keys(f"{name}, {key}", value, ("mean", "std", "value"))
         else:
             keys[key] = value
     return keys
 
 
-def _parameter(value: Parameter | Range | Mapping[str, Any]) -> dict[str, Any]:
-    if isinstance(value, Parameter):
-        keys: dict[str, Any] = {"unit": value.unit} if value.unit else {}
-        keys["prior"] = [float(end) for end in value.prior]
-        if value.bounds is not None:
-            keys["bounds"] = [float(end) for end in value.bounds]
-        return keys
+def _parameter(name: str, value: Parameter | Range | Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(value, Mapping):
         return dict(value)
-    return {"prior": [float(end) for end in value]}
+    parameter = ranged(name, value)
+    keys: dict[str, Any] = {"unit": parameter.unit} if parameter.unit else {}
+    keys["prior"] = list(parameter.prior)
+    if parameter.bounds is not None:
+        keys["bounds"] = list(parameter.bounds)
+    return keys
 
 
 def tables(entries: Mapping[str, Entry], key: str) -> dict[str, dict[str, Any]]:
     """Return the entries of states or outputs as tables of keys; `key` is that of an entry that is an expression alone."""
     whole = {name: entry if isinstance(entry, Mapping) else {key: entry} for name, entry in entries.items()}
-    return {name: _keys(entry, (key, "next", "start", "noise", "limits")) for name, entry in whole.items()}
+    return {name: _keys(name, entry, (key, "next", "start", "noise", "limits")) for name, entry in whole.items()}
 
 
 def _table(name: str, entries: Mapping[str, Any]) -> str:
     if not entries:
         return ""
-    return f"[{name}]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in entries.items()) + "\n"
+    return f"[{name}]\n" + "".join(f"{key} = {_value(key, value)}\n" for key, value in entries.items()) + "\n"
 
 
 def _event(event: Mapping[str, Any]) -> str:
@@ -159,12 +162,12 @@ def _event(event: Mapping[str, Any]) -> str:
     keys: dict[str, Any] = {}
     for key, value in event.items():
         if isinstance(value, Mapping):
-            keys[key] = {state: expression(inner) for state, inner in value.items()}
+            keys[key] = {state: expression(f"events: {key}, {state}", inner) for state, inner in value.items()}
         elif isinstance(value, Sequence) and not isinstance(value, str):
-            keys[key] = [expression(inner) for inner in value]
+            keys[key] = [expression(f"events: {key}", inner) for inner in value]
         else:
-            keys[key] = expression(value)
-    return "[[event]]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in keys.items()) + "\n"
+            keys[key] = expression(f"events: {key}", value)
+    return "[[event]]\n" + "".join(f"{key} = {_value(key, value)}\n" for key, value in keys.items()) + "\n"
 
 
 class Text:
@@ -193,9 +196,9 @@ class Text:
         self.step = record.get("step")
         self.text = (
             _table("twin", {"name": name})
-            + _table("parameters", {key: _parameter(value) for key, value in parameters.items()})
-            + _table("constants", {key: expression(value) for key, value in constants.items()})
-            + _table("define", {key: expression(value) for key, value in define.items()})
+            + _table("parameters", {key: _parameter(key, value) for key, value in parameters.items()})
+            + _table("constants", {key: expression(f"constants: {key}", value) for key, value in constants.items()})
+            + _table("define", {key: expression(f"define: {key}", value) for key, value in define.items()})
             + _table("states", tables(states, "rate"))
             + _table("inputs", {key: unit if isinstance(unit, Mapping) else {"unit": unit} for key, unit in inputs.items()})
             + _table("outputs", tables(outputs, "value"))

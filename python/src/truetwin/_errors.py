@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
+from ._numbers import number, shown
+
 
 class TruetwinError(Exception):
     """A wrong call, file or record; the message is the line that the program printed.
@@ -40,5 +44,8 @@ class Diverged(Exception):
     """
 
     def __init__(self, time: float = 0.0) -> None:
+        remedy = "give the time in seconds"
+        self.time = number("time of the divergence", time, remedy)
+        if not math.isfinite(self.time):
+            raise ValueError(f"time of the divergence = {shown(time)}; {remedy}")
         super().__init__(f"diverged at {time} s")
-        self.time = float(time)

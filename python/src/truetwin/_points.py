@@ -10,7 +10,8 @@ import numpy as np
 
 from ._equations import Entry, _parameter, expression, tables
 from ._errors import Diverged
-from ._simulator import Array, Parameter, Range, _located, _name, _units
+from ._numbers import Array, number, reals
+from ._simulator import Parameter, Range, _located, _name, _units
 
 #: ``f(t, x, u, theta)``: arrays of shape (points,), (states, points), (inputs, points) and (parameters, points).
 Equation = Callable[[Array, Array, Array, Array], Array]
@@ -57,22 +58,24 @@ class PointModel:
         if observe:
             self._functions["observe"] = (observe, self.outputs)
         self._parameters = len(parameters)
-        self.description = {
+        description = {
             "name": self.name,
             "serves": list(self._functions),
-            "parameters": {key: _parameter(value) for key, value in parameters.items()},
-            "constants": {key: expression(value) for key, value in constants.items()},
-            "define": {key: expression(value) for key, value in define.items()},
+            "parameters": {key: _parameter(key, value) for key, value in parameters.items()},
+            "constants": {key: expression(f"constants: {key}", value) for key, value in constants.items()},
+            "define": {key: expression(f"define: {key}", value) for key, value in define.items()},
             "inputs": {key: unit if isinstance(unit, Mapping) else {"unit": unit} for key, unit in units.items()},
             **described,
             "record": {key: value for key, value in record.items() if (key, value) != ("integrator", "discrete")},
         }
+        # Here and not in a thread of the server, where a wrong value would be no error of the call.
+        self.description = json.dumps(_json("description", description)).encode() + b"\n"
 
     def answer(self, line: bytes, read: Callable[[int], bytes]) -> bytes:
         """Return the answer to one request; `read` returns the bytes behind its line."""
         request = json.loads(line)
         if request["request"] == "describe":
-            return json.dumps(_finite(self.description)).encode() + b"\n"
+            return self.description
         function, names = self._functions[request["request"]]
         points = request["points"]
         table = np.frombuffer(read(request["bytes"]), "<f8").reshape(-1, points)
@@ -116,7 +119,7 @@ def _title(function: Equation) -> str:
 
 
 def _checked(title: str, values: Any, names: Sequence[str], points: int) -> Array:
-    """Return the values of a function.
+    """Return the values of a function; nan where they are masked, which is a divergence there.
 
     Raises
     ------
@@ -133,7 +136,7 @@ def _checked(title: str, values: Any, names: Sequence[str], points: int) -> Arra
         raise ValueError(f"{title} returned shape {values.shape}; {expected}")
     if values.dtype.kind not in "fiub":
         raise TypeError(f"{title} returned an array of {values.dtype}; {expected}, of real numbers")
-    return np.asarray(values, dtype=float)
+    return reals(values, expected)
 
 
 def _open(entries: Mapping[str, Entry]) -> dict[str, Entry]:
@@ -141,12 +144,15 @@ def _open(entries: Mapping[str, Entry]) -> dict[str, Entry]:
     return {key: entry if isinstance(entry, Mapping) else {"unit": str(entry)} for key, entry in entries.items()}
 
 
-def _finite(value: Any) -> Any:
-    """Return a description without infinities, which JSON has not: an open end of limits is null."""
+def _json(what: str, value: Any) -> Any:
+    """Return a description as JSON has it: its infinities, which JSON has not, are null, as an open end of limits is."""
+    if value is None or isinstance(value, (str, bool)):
+        return value
     if isinstance(value, Mapping):
-        return {key: _finite(inner) for key, inner in value.items()}
+        return {str(key): _json(str(key), inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(inner) for inner in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value
+        return [_json(what, inner) for inner in value]
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    real = number(what, value, "give a number or a text")
+    return real if np.isfinite(real) else None

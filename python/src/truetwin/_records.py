@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +12,9 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 import numpy.typing as npt
 
-from ._simulator import Array
+from ._names import Names, Rows
+from ._numbers import Array, one_line, reals
+from ._times import is_timed, seconds
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped, unused-ignore]
@@ -20,6 +23,9 @@ if TYPE_CHECKING:
 Record = Union[str, "os.PathLike[str]", "pd.DataFrame", Mapping[str, npt.ArrayLike]]
 #: One record, or several of one system.
 Records = Union[Record, Sequence[Record]]
+
+#: Columns that a message lists.
+NAMED = 20
 
 
 def is_frame(record: object) -> bool:
@@ -42,100 +48,150 @@ class Writer:
 
     Parameters
     ----------
-    folder : Path
-        Existing folder for the files.
+    names : Names
+        Words of the call, which get those of the written records.
     columns : mapping, optional
         Column of the record for each name in the twin, as in ``{"t": "time", "push": "torque"}``.
-    known : sequence of str, optional
-        Names of the twin's inputs and outputs; other columns are left out. None: all columns are written.
+    inputs, outputs : sequence of str, optional
+        Names of the twin; other columns are left out. None: they are unknown, and all columns are written.
     step : float, optional
         Step in seconds of records without times.
     """
 
-    def __init__(self, folder: Path, columns: Mapping[str, str] | None, known: Sequence[str] | None, step: float | None) -> None:
-        self._folder = folder
-        self._columns = columns
-        self._known = known
+    def __init__(
+        self,
+        names: Names,
+        columns: Mapping[str, str] | None,
+        inputs: Sequence[str] | None,
+        outputs: Sequence[str] | None,
+        step: float | None,
+    ) -> None:
+        self._names = names
+        self._columns = columns or {}
+        self._inputs = inputs
+        self._outputs = outputs
         self._step = step
-        self._count = 0
 
-    def path(self, record: Record) -> str:
-        """Return the path of a record, after writing it if it is no file yet."""
+    def path(self, name: str, record: Record, driven: bool = False) -> str:
+        """Return the path of a record, after writing it if it is no file yet; `name` is that of messages.
+
+        A record that is `driven` needs no outputs.
+        """
         if isinstance(record, (str, os.PathLike)):
             return os.fspath(record)
         if not (isinstance(record, Mapping) or is_frame(record)):
-            raise TypeError(f"a record of type {type(record).__name__}; give a path, a DataFrame or a dict of arrays")
-        self._count += 1
-        path = self._folder / f"record-{self._count}.csv"
-        write(path, self._chosen(record))
+            raise TypeError(f"{name}: a record of type {type(record).__name__}; give a path, a DataFrame or a dict of arrays")
+        columns = self._chosen(name, record, driven)
+        header = header_of(columns)
+        # The names of columns may have more than one line.
+        first = 2 + len(re.findall("\r\n?|\n", header))
+        index = getattr(record, "index", None) if is_frame(record) else None
+        path = self._names.write(name, Rows(first, len(next(iter(columns.values()))), index))
+        write(path, header, columns)
         return str(path)
 
-    def _chosen(self, record: Any) -> dict[str, Array]:
-        names = list(record.columns) if is_frame(record) else list(record)
-        columns = {str(name): _numbers(str(name), record[name]) for name in names if self._wanted(str(name))}
-        time = self._columns.get("t", "t") if self._columns else "t"
+    def _chosen(self, label: str, record: Any, driven: bool) -> dict[str, Array]:
+        names = list(record.columns if is_frame(record) else record)
+        self._check(label, [str(name) for name in names], driven)
+        time = self._columns.get("t", "t")
+        columns = {
+            str(name): _column(f"{label}, column {name}", record[name], str(name) == time) for name in names if self._wanted(str(name))
+        }
         if time not in columns:
-            times = self._times(record, len(next(iter(columns.values()), np.empty(0))))
+            times = self._times(label, record, len(next(iter(columns.values()), np.empty(0))))
             columns = {**({} if times is None else {time: times}), **columns}
+        _check_lengths(label, columns)
         return columns
 
     def _wanted(self, name: str) -> bool:
-        if self._columns is not None:
-            return name == "t" and "t" not in self._columns or name in self._columns.values()
-        if self._known is None:
+        if name in self._columns.values():
             return True
         # The usual names u, u1, y, y2 stand for inputs and outputs in their order.
-        usual = name[:1] in ("u", "y") and (name[1:].isdecimal() or not name[1:])
-        return name == "t" or usual or name in self._known
+        usual = name == "t" or _is_usual("u", name) or _is_usual("y", name)
+        if self._inputs is None or self._outputs is None:
+            return usual or not self._columns
+        return usual or name in (*self._inputs, *self._outputs) and name not in self._columns
 
-    def _times(self, record: Any, samples: int) -> Array | None:
+    def _check(self, label: str, given: Sequence[str], driven: bool) -> None:
+        """Refuse a record that lacks an input, or all outputs, in the words of the user; the program knows its own file alone."""
+        missing = self._missing("u", self._inputs or (), given)
+        outputs = self._missing("y", self._outputs or (), given)
+        if not driven and self._outputs and len(outputs) == len(self._outputs):
+            missing += outputs[:1]
+        for name, column in missing:
+            asked = f", which columns gives for {name}" if name in self._columns else ""
+            other = "" if driven else f", or name another with columns={{{name!r}: ...}}"
+            remedy = "correct columns" if asked else f"add it{other}"
+            raise ValueError(f"{label} has no column {one_line(column)}{asked}; its columns are {_listed(given)}: {remedy}")
+
+    def _missing(self, letter: str, names: Sequence[str], given: Sequence[str]) -> list[tuple[str, str]]:
+        """Return inputs or outputs without a column, and its name; none where usual names stand for them."""
+        if any(_is_usual(letter, name) and name not in names for name in (*given, *self._columns)):
+            return []
+        columns = [(name, self._columns.get(name, name)) for name in names]
+        return [(name, column) for name, column in columns if column not in given]
+
+    def _times(self, label: str, record: Any, samples: int) -> Array | None:
         """Return the times of a record without a column for them; None if nothing gives them."""
         if is_frame(record):
             index = record.index
-            if index.name in ("t", "time") or index.dtype.kind in "mM" or hasattr(index.dtype, "tz"):
-                return _numbers("index", index)
+            if index.name in ("t", "time", self._columns.get("t")) or is_timed(index):
+                return _column(f"{label}, index", index, True)
+        if "t" in self._columns:
+            raise ValueError(f"{label} has no column {self._columns['t']}, which columns gives for t; correct columns")
         return None if self._step is None else np.arange(samples, dtype=float) * self._step
 
 
-def _numbers(name: str, values: Any) -> Array:
-    """Return a column as floats, nan where it is masked; time stamps as seconds from the first."""
-    dtype = getattr(values, "dtype", None)
-    if hasattr(dtype, "tz"):
-        values = values.to_numpy(dtype="datetime64[ns]")
-    elif hasattr(dtype, "na_value") and hasattr(values, "to_numpy") and getattr(dtype, "kind", "") in "biuf":
-        # The nullable numbers of pandas.
-        values = values.to_numpy(dtype=float, na_value=np.nan)
-    array = np.asarray(values)
-    mask = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
-    if array.dtype.kind == "c":
-        raise ValueError(f"record, column {name}: complex values; give real ones, such as their real parts or magnitudes")
-    if array.ndim != 1:
-        raise ValueError(f"record, column {name}: shape {array.shape}; give one value per sample")
-    if array.dtype.kind in "mM" and array.size:
-        array = np.asarray((array - array[0]) / np.timedelta64(1, "s"), dtype=float)
+def _listed(names: Sequence[str]) -> str:
+    """Return names in one line, the first of many."""
+    more = ", …" if len(names) > NAMED else ""
+    return one_line(", ".join(names[:NAMED]) or "none") + more
+
+
+def _is_usual(letter: str, name: str) -> bool:
+    return name[:1] == letter and (name[1:].isdecimal() or not name[1:])
+
+
+def _column(what: str, values: Any, timed: bool) -> Array:
+    """Return a column as floats, nan where it is masked or missing; times as seconds from the first if it is the column of times."""
+    what = one_line(what)
     try:
-        floats = np.asarray(array, dtype=float)
-        return floats if mask is None else np.where(mask, np.nan, floats)
-    except (TypeError, ValueError):
-        raise ValueError(f"record, column {name}: {array.dtype} holds other values than numbers; give numbers, nan where missing") from None
+        moments = seconds(values) if timed else None
+        remedy = "give seconds, or times, as pandas.to_datetime reads them from texts" if timed else "give numbers, nan where missing"
+        column = reals(values, remedy) if moments is None else moments
+    except OverflowError:
+        raise ValueError(f"{what}: a number beyond those of floats; correct it, or give nan where an output is missing") from None
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{what}: {one_line(str(error))}") from None
+    if column.ndim != 1:
+        raise ValueError(f"{what}: shape {column.shape}; give one value per sample")
+    return column
 
 
-def write(path: Path, columns: Mapping[str, Array]) -> None:
-    """Write columns as a CSV file; no number loses a digit."""
+def _check_lengths(label: str, columns: Mapping[str, Array]) -> None:
     if not columns:
-        raise ValueError("record: no column of the twin; give t, the inputs and the outputs")
+        raise ValueError(f"{label}: no column of the twin; give t, the inputs and the outputs")
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
-        given = ", ".join(f"{name}: {length}" for name, length in lengths.items())
-        raise ValueError(f"record: columns of different lengths ({given}); give one value per sample in each")
+        given = _listed([f"{name}: {length}" for name, length in lengths.items()])
+        raise ValueError(f"{label}: columns of different lengths ({given}); give one value per sample in each")
+
+
+def header_of(columns: Iterable[str]) -> str:
+    """Return the header of a CSV file."""
+    return ",".join(_cell(name) for name in columns)
+
+
+def write(path: Path, header: str, columns: Mapping[str, Array]) -> None:
+    """Write columns of one length as a CSV file; no number loses a digit."""
     rows = zip(*(values.tolist() for values in columns.values()))
     with open(path, "w", encoding="utf-8") as file:
-        file.write(",".join(_cell(name) for name in columns) + "\n")
+        file.write(header + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
 
 
 def _cell(text: str) -> str:
-    if any(c in text for c in ',"\n;\t'):
+    if any(c in text for c in ',"\r\n;\t#'):
         return '"' + text.replace('"', '""') + '"'
     return text
 

@@ -37,11 +37,12 @@ class Server:
         self._open: set[socket.socket] = set()
         self._lock = threading.Lock()
         self._closed = False
-        self._folder: str | None = None
+        #: Folder of the socket; None for one of TCP.
+        self.folder: str | None = None
         self._token: str | None = None
         if hasattr(socket, "AF_UNIX"):
-            self._folder = _short_folder()
-            address = os.path.join(self._folder, "relay")
+            self.folder = _short_folder()
+            address = os.path.join(self.folder, "relay")
             self._listener = socket.socket(socket.AF_UNIX)
             self._listener.bind(address)
         else:
@@ -77,8 +78,8 @@ class Server:
             except OSError:
                 pass
             connection.close()
-        if self._folder:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        if self.folder:
+            shutil.rmtree(self.folder, ignore_errors=True)
 
     def _accept(self) -> None:
         while True:

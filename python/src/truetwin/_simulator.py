@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ._errors import Diverged
+from ._numbers import Array, interval, number, reals, shown, whole
 
-Array = npt.NDArray[np.float64]
 #: What a simulator may return: one output, a tuple or the columns of an array for several, or outputs by name.
 Outputs = Union[npt.ArrayLike, Mapping[str, npt.ArrayLike]]
 #: ``f(parameters, inputs, time)``; with arguments named ``step`` or ``seed``, it gets these too.
@@ -66,15 +66,15 @@ class Model:
         self.simulator = simulator
         self.inputs = _units(inputs)
         self.outputs = _units(outputs)
-        self.parameters = {key: _parameter(key, value) for key, value in parameters.items()}
-        self.step = float(step)
+        self.parameters = {key: ranged(key, value) for key, value in parameters.items()}
+        self.step = seconds("step", step)
         self.name = name or _name(simulator)
         self.failure: BaseException | None = None
         self._takes_step = _takes(simulator, "step")
         self.takes_seed = _takes(simulator, "seed")
         self._kept: dict[bytes, dict[str, Array]] = {}
         self._times: dict[tuple[float, int, float], Array] = {}
-        record: dict[str, Any] = {"step": self.step, "samples": whole("samples", samples)}
+        record: dict[str, Any] = {"step": self.step, "samples": samples}
         if levels is not None:
             record["input"] = planned(levels, hold)
             if files := [name for name, plan in record["input"].items() if isinstance(plan, str)]:
@@ -184,24 +184,28 @@ def _numbers(values: Array) -> str:
 
 def _reals(values: Any) -> Array:
     """Return outputs as floats, nan where they are masked."""
-    if np.iscomplexobj(values):
-        raise ValueError("the simulator returned complex values; return real ones, such as their real parts or magnitudes")
-    if isinstance(values, np.ma.MaskedArray):
-        return np.asarray(np.ma.filled(values.astype(float), np.nan))
-    return np.asarray(values, dtype=float)
+    try:
+        return reals(values, "return numbers, nan where missing")
+    except ValueError as error:
+        raise ValueError(f"the simulator returned {error}") from None
 
 
-def whole(name: str, value: int) -> int:
-    """Return a number of samples; refuse one that is not whole, or below 1."""
-    if value != int(value) or value < 1:
-        raise ValueError(f"{name} = {value}; give a whole number of samples, at least 1")
-    return int(value)
+def seconds(name: str, value: object) -> float:
+    """Return a number of seconds; refuse one that is not finite, or not above 0."""
+    remedy = "give a number of seconds above 0"
+    given = number(name, value, remedy)
+    if not 0 < given < np.inf:
+        raise ValueError(f"{name} = {shown(value)}; {remedy}")
+    return given
 
 
-def check_noise(level: object) -> None:
-    """Refuse a noise level that is negative or no finite number; expressions are checked by the program."""
-    if isinstance(level, (int, float, np.number)) and not 0 <= level < np.inf:
-        raise ValueError(f"noise = {level}; give a standard deviation, 0 or more, in the unit of the output")
+def noise_level(output: str, level: object) -> float:
+    """Return the noise level of an output; refuse one that is negative or no finite number."""
+    remedy = "give a standard deviation, 0 or more, in the unit of the output"
+    given = number(f"noise of {output}", level, remedy)
+    if not 0 <= given < np.inf:
+        raise ValueError(f"noise of {output} = {shown(level)}; {remedy}")
+    return given
 
 
 def _frozen(values: Array) -> Array:
@@ -235,40 +239,31 @@ def planned(levels: Levels, hold: int) -> dict[str, Any]:
         elif isinstance(plan, Mapping):
             if unknown := set(plan) - {"levels", "hold"}:
                 raise ValueError(f"levels: {name} has no {sorted(unknown)[0]}; give levels and hold")
-            plans[name] = _staircase(f"levels: {name}", plan.get("levels"), plan.get("hold", hold))
+            plans[name] = _staircase(f"levels: {name}", plan.get("levels"), whole(f"levels: {name}, hold", plan.get("hold", hold)))
         elif np.ndim(plan) == 0 and not isinstance(plan, bool):
-            try:
-                plans[name] = float(plan)  # type: ignore[arg-type]
-            except (TypeError, ValueError):
-                raise ValueError(f"levels: {name} = {plan!r}; give (low, high), a number, or the path of a file") from None
+            plans[name] = number(f"levels: {name}", plan, "give (low, high), a number, or the path of a file")
         else:
             plans[name] = _staircase(f"levels: {name}", plan, hold)
     return plans
 
 
 def _staircase(what: str, levels: Any, hold: int) -> dict[str, Any]:
-    samples = whole("hold", hold)
-    try:
-        low, high = levels
-        return {"levels": [float(low), float(high)], "hold": samples}
-    except (TypeError, ValueError):
-        raise ValueError(f"{what} = {levels!r}; give (low, high)") from None
+    return {"levels": list(interval(what, levels)), "hold": hold}
 
 
-def _parameter(name: str, value: Parameter | Range) -> Parameter:
-    if isinstance(value, Parameter):
-        return value
-    try:
-        low, high = value
-        return Parameter((float(low), float(high)))
-    except (TypeError, ValueError):
-        raise ValueError(f"parameters: {name} = {value!r}; give (low, high), or truetwin.Parameter(...)") from None
+def ranged(name: str, value: Parameter | Range) -> Parameter:
+    """Return a parameter with its ranges as floats."""
+    what = f"parameters: {name}"
+    if not isinstance(value, Parameter):
+        return Parameter(interval(what, value, "give (low, high), or truetwin.Parameter(...)"))
+    bounds = None if value.bounds is None else interval(f"{what}, bounds", value.bounds)
+    return Parameter(interval(f"{what}, prior", value.prior), bounds, value.unit)
 
 
 def _described(name: str, parameter: Parameter) -> dict[str, Any]:
-    described: dict[str, Any] = {"name": name, "unit": parameter.unit, "prior": [float(end) for end in parameter.prior]}
+    described: dict[str, Any] = {"name": name, "unit": parameter.unit, "prior": list(parameter.prior)}
     if parameter.bounds is not None:
-        described["bounds"] = [float(end) for end in parameter.bounds]
+        described["bounds"] = list(parameter.bounds)
     return described
 
 

@@ -11,19 +11,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from . import _process, _records
-from ._equations import Entry, Expression, Text
+from ._equations import Entry, Expression, Text, is_expression
 from ._errors import TruetwinError
+from ._names import Names
+from ._numbers import Array, count, number, whole
 from ._points import Equation, PointModel, States
 from ._records import Record, Records
 from ._report import Report
 from ._results import Check, Diagnosis, Estimate, Estimator, Fit, Json, Scorecard
 from ._server import Server
-from ._simulator import Array, Levels, Model, Parameter, Range, Simulator, _units, check_noise, planned, whole
+from ._simulator import Levels, Model, Parameter, Range, Simulator, _units, noise_level, planned, seconds
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped, unused-ignore]
 
 Path_ = str | os.PathLike[str]
+
+#: The program's seeds have 64 bits.
+LARGEST_SEED = 2**64 - 1
 
 
 class Twin:
@@ -35,7 +40,7 @@ class Twin:
         ``f(parameters, inputs, time)`` returns the outputs at `time`. `parameters` is a dict of floats, `inputs` a dict of
         arrays, and `time` the array 0, step, 2·step, …. Input k acts from sample k to sample k + 1. One output is a sequence of one
         number per sample; several are a tuple, the columns of an array, or a dict. The same call must give the same result.
-        A run that is not finite counts as diverged: return nan, or raise `Diverged`. Other exceptions end the call.
+        A run that is not finite counts as diverged: return nan or a masked value, or raise `Diverged`. Other exceptions end the call.
         If `f` has an argument `step`, it gets the step in seconds. If it has an argument `seed`, it draws its own noise from it,
         and none if it is None; `noise` is much faster. Without a callable, the twin is one that the program knows: give `study`, or
         use `Twin.named`.
@@ -119,12 +124,11 @@ class Twin:
         timeout: float = 60.0,
     ) -> None:
         self._study = study
-        self._threads = threads
-        self._workers = workers
-        self._timeout = timeout
+        self._threads = None if threads is None else count("threads", threads, 1)
+        self._workers = count("workers", workers, 1)
+        self._timeout = seconds("timeout", timeout)
+        samples, hold = whole("samples", samples), whole("hold", hold)
         self._noise: dict[str, float] = {}
-        for level in noise.values() if isinstance(noise, Mapping) else [] if noise is None else [noise]:
-            check_noise(level)
         self._model: Model | PointModel | None = None
         self._text: Text | None = None
         self.name: str | None
@@ -135,11 +139,12 @@ class Twin:
                 raise ValueError("equations need parameters={name: (low, high)} and outputs={name: expression}")
             if not (drift or isinstance(states, Mapping)):
                 raise ValueError("states without rates; give states={name: rate}, or drift=f")
-            plan: dict[str, Any] = {} if step is None else {"step": float(step), "samples": whole("samples", samples)}
+            plan: dict[str, Any] = {} if step is None else {"step": seconds("step", step), "samples": samples}
             if levels is not None:
                 plan["input"] = planned(levels, hold)
             plan |= record or {}
-            moving, shown = _noisy(states, noise, outputs, "rate", drift), _noisy(outputs, noise, outputs, "value", observe)
+            levels_of_noise = _noise_levels(noise, outputs, _names_of(states), expressions=True)
+            moving, shown = _noisy(states, levels_of_noise, "rate", drift), _noisy(outputs, levels_of_noise, "value", observe)
             if drift or observe:
                 if events:
                     raise ValueError("events belong to equations as text; give states={name: rate}, and no drift or observe")
@@ -170,10 +175,7 @@ class Twin:
         if noise is not None:
             if study is not None:
                 raise ValueError("noise and study; put the noise into the study file, as an [[effect]] with id = \"sensor-noise\"")
-            names = self._model.outputs
-            self._noise = dict(noise) if isinstance(noise, Mapping) else dict.fromkeys(names, float(noise))
-            if unknown := set(self._noise) - set(names):
-                raise ValueError(f"noise of {', '.join(sorted(unknown))}; the outputs are {', '.join(names)}")
+            self._noise = _noise_levels(noise, self._model.outputs)
 
     @classmethod
     def named(cls, name: str, *, threads: int | None = None) -> Twin:
@@ -204,7 +206,8 @@ class Twin:
         ----------
         records : record or sequence of records
             A path of a CSV file, a DataFrame, or a dict of arrays, with the columns ``t`` and the names of inputs and outputs. nan
-            marks outputs that were not measured. A record without ``t`` has the twin's step.
+            marks outputs that were not measured. Times are seconds, or datetimes, all with a zone or all without. A record without ``t``
+            has the twin's step. Messages call the first record ``record 1``, and count its rows from 0, as ``.iloc`` does.
         profile : bool, optional
             Profile likelihood of every parameter, as curves and on the page; otherwise of those alone that the prior shapes.
         columns : dict of str to str, optional
@@ -223,8 +226,8 @@ class Twin:
             options = [*call.subject(), *call.columns(columns), *(["--profile"] if profile else [])]
             folder, text = call.folder("fit", [*files, *options], seed, out)
             pictures = sorted(folder.glob("overlay*.svg"), key=lambda path: (len(path.name), path.name))
-            report = Report(text, pictures=tuple(path.read_text(encoding="utf-8") for path in pictures))
-            return Fit._of(_json(folder / "fit.json"), report)
+            report = Report(text, pictures=tuple(call.read(path) for path in pictures))
+            return Fit._of(call.json(folder / "fit.json"), report)
 
     def diagnose(
         self,
@@ -267,10 +270,10 @@ class Twin:
         """
         with _Call(self) as call:
             files = call.records(records, columns)
-            options = [*call.subject(), *call.columns(columns), "--calibrate", str(calibrate)]
+            options = [*call.subject(), *call.columns(columns), *_option("--calibrate", calibrate, 0)]
             options += ["--quick"] * quick + ["--step-of-record"] * step_of_record
             if validation is not None:
-                options += ["--validation", *call.records(validation, columns)]
+                options += ["--validation", call.record("validation", validation, columns)]
             excluded = [without] if isinstance(without, str) else list(without or ())
             if isinstance(self._model, Model) and not self._model.takes_seed and self._study is None:
                 # The noise level of such a twin is fitted in every hypothesis. As an effect it would count twice, and be a gap.
@@ -278,8 +281,8 @@ class Twin:
             if excluded:
                 options += ["--without", ",".join(excluded)]
             folder, text = call.folder("diagnose", [*files, *options], seed, out)
-            report = Report(text, page=(folder / "report.html").read_text(encoding="utf-8"))
-            return Diagnosis._of(_json(folder / "report.json"), report)
+            report = Report(text, page=call.read(folder / "report.html"))
+            return Diagnosis._of(call.json(folder / "report.json"), report)
 
     def pretrain(
         self,
@@ -306,7 +309,7 @@ class Twin:
             Its file is an argument of `estimate`.
         """
         with _Call(self) as call:
-            options = [*call.subject(noise=True), "--out", os.fspath(out), *_option("--bank-size", bank_size), *_option("--epochs", epochs)]
+            options = [*call.subject(noise=True), "--out", os.fspath(out), *_option("--bank-size", bank_size, 1), *_option("--epochs", epochs, 1)]
             raw = json.loads(call.run("pretrain", [*options, "--json"], seed))
             return Estimator._of(raw, Path(out))
 
@@ -344,13 +347,13 @@ class Twin:
         Estimate
         """
         with _Call(self) as call:
-            options = [*call.records([record], columns), *call.columns(columns), "--estimator", os.fspath(estimator)]
+            options = [call.record("record", record, columns), *call.columns(columns), "--estimator", os.fspath(estimator)]
             if validation is not None:
-                options += ["--validation", *call.records(validation, columns)]
+                options += ["--validation", call.record("validation", validation, columns)]
             options += ["--always-refine"] * always_refine + ["--step-of-record"] * step_of_record
             folder, text = call.folder("estimate", options, seed, out)
-            report = Report(text, pictures=((folder / "overlay.svg").read_text(encoding="utf-8"),))
-            return Estimate._of(_json(folder / "estimate.json"), report)
+            report = Report(text, pictures=(call.read(folder / "overlay.svg"),))
+            return Estimate._of(call.json(folder / "estimate.json"), report)
 
     @overload
     def simulate(
@@ -389,11 +392,12 @@ class Twin:
             The record; a DataFrame if `inputs` is one.
         """
         with _Call(self) as call:
-            theta = ",".join(f"{name}={float(value)!r}" for name, value in parameters.items())
+            values = {name: number(f"parameters: {name}", value, "give a number") for name, value in parameters.items()}
+            theta = ",".join(f"{name}={value!r}" for name, value in values.items())
             file = call.path / "simulated.csv"
             options = [*call.subject(noise=True), "--theta", theta, "--out", str(file)]
             if inputs is not None:
-                options += ["--input", *call.records([inputs], None)]
+                options += ["--input", call.record("input", inputs, None, driven=True)]
             if noise_free:
                 options.append("--noise-free")
             call.run("simulate", options, seed)
@@ -418,9 +422,12 @@ class Twin:
         Check
         """
         with _Call(self) as call:
-            files = [] if record is None else [*call.records([record], columns), *call.columns(columns)]
+            files = [] if record is None else [call.record("record", record, columns), *call.columns(columns)]
             # A failed check is an answer with exit code 1.
-            return Check._of(json.loads(call.run("check", [*files, *call.subject(noise=True), "--json"], seed, answers=(0, 1))))
+            raw = json.loads(call.run("check", [*files, *call.subject(noise=True), "--json"], seed, answers=(0, 1)))
+            for finding in raw["findings"]:
+                finding["message"] = call.names.finding("record", finding["message"])
+            return Check._of(raw)
 
     def withheld(
         self,
@@ -455,13 +462,12 @@ class Twin:
         Scorecard
         """
         with _Call(self) as call:
-            options = [*call.subject(noise=True), "--trials", str(trials)]
+            options = [*call.subject(noise=True), *_option("--trials", trials, 1)]
             options += ["--detection-only"] * detection_only + ["--validation"] * validation
             if like is not None:
-                options += ["--like", *call.records([like], columns), *call.columns(columns)]
+                options += ["--like", call.record("like", like, columns), *call.columns(columns)]
             folder, text = call.folder("withheld", options, seed, out)
-            page = (folder / "scorecard.html").read_text(encoding="utf-8")
-            return Scorecard._of(_json(folder / "scorecard.json"), Report(text, page=page))
+            return Scorecard._of(call.json(folder / "scorecard.json"), Report(text, page=call.read(folder / "scorecard.html")))
 
 
 class _Call:
@@ -477,9 +483,14 @@ class _Call:
     def __enter__(self) -> _Call:
         with ExitStack() as stack:
             self.path = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="truetwin-")))
+            self.names = Names(self.path)
             if self._model is not None:
                 self._model.failure = None
                 self._server = stack.enter_context(Server(self._model))
+                # The callable is known by its name; the command of the relay says nothing to a user.
+                self.names.say(self._server.command, str(self._model.name))
+                if self._server.folder:
+                    self.names.hide(self._server.folder)
             self._stack = stack.pop_all()
         return self
 
@@ -488,11 +499,16 @@ class _Call:
 
     def records(self, records: Records, columns: Mapping[str, str] | None) -> list[str]:
         """Return the paths of records, after writing those that are no files."""
+        given = _records.as_list(records)
+        return [self.record(f"record {at}", record, columns) for at, record in enumerate(given, start=1)]
+
+    def record(self, name: str, record: Record, columns: Mapping[str, str] | None, driven: bool = False) -> str:
+        """Return the path of a record, after writing it if it is no file; `name` is that of messages, and one that is `driven` needs no outputs."""
         if self._writer is None:
             model = self._model or self._twin._text
-            known = None if model is None else [*model.inputs, *model.outputs]
-            self._writer = _records.Writer(self.path, columns, known, None if model is None else model.step)
-        return [self._writer.path(record) for record in _records.as_list(records)]
+            inputs, outputs, step = (list(model.inputs), list(model.outputs), model.step) if model else (None, None, None)
+            self._writer = _records.Writer(self.names, columns, inputs, outputs, step)
+        return self._writer.path(name, record, driven)
 
     def columns(self, columns: Mapping[str, str] | None) -> list[str]:
         """Return the option that names columns."""
@@ -510,6 +526,8 @@ class _Call:
         if twin._text is not None:
             file = self.path / "twin.toml"
             file.write_text(twin._text.text, encoding="utf-8")
+            # The user has no such file, but the method that returns its text.
+            self.names.say(str(file), "toml()")
             return ["--study", str(file)]
         if self._model is None:
             return ["--twin", str(twin.name)]
@@ -521,20 +539,26 @@ class _Call:
 
     def run(self, verb: str, options: Sequence[str], seed: int, *, answers: Sequence[int] = (0,)) -> str:
         """Run a verb and return what it prints."""
-        words = [verb, *options, "--seed", str(seed), *_option("--threads", self._twin._threads)]
+        words = [verb, *options, "--seed", str(count("seed", seed, 0, LARGEST_SEED)), *_option("--threads", self._twin._threads, 1)]
         environment = {}
         if self._server is not None:
             words += ["--program", self._server.command]
-            words += ["--workers", str(self._twin._workers), "--timeout", repr(float(self._twin._timeout))]
+            words += ["--workers", str(self._twin._workers), "--timeout", repr(self._twin._timeout)]
             environment = self._server.environment
         try:
-            return _process.run(words, environment, answers=answers)
+            return self.names.plain(_process.run(words, environment, self.names, answers=answers))
         except TruetwinError as error:
-            if self._model is None or self._server is None:
-                raise
-            # The callable is known by its name; the command of the relay says nothing to a user.
-            line = error.line.replace(f"`{self._server.command}`", f"`{self._model.name}`")
-            raise type(error)(line, error.exit_code) from self._model.failure
+            failure = self._model.failure if self._model else error.__cause__
+            raise type(error)(self.names.message(error.line), error.exit_code) from failure
+
+    def read(self, path: Path) -> str:
+        """Return the text of a result in the words of the user."""
+        return self.names.plain(path.read_text(encoding="utf-8"))
+
+    def json(self, path: Path) -> Json:
+        """Return a result of the program in the words of the user."""
+        raw: Json = json.loads(self.read(path))
+        return raw
 
     def folder(self, verb: str, options: Sequence[str], seed: int, out: Path_ | None) -> tuple[Path, str]:
         """Run a verb that fills a folder; return the folder and what it prints."""
@@ -542,10 +566,22 @@ class _Call:
         return folder, self.run(verb, [*options, "--out", str(folder)], seed)
 
 
-def _noisy(entries: States, noise: float | Mapping[str, Any] | None, outputs: States, key: str, function: Equation | None) -> dict[str, Entry]:
-    """Return entries of states or outputs with the noise of the call: a number is that of each output."""
-    names = list(_units(outputs) if not isinstance(outputs, Mapping) else outputs)
-    levels = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(names, float(noise))
+def _names_of(entries: States) -> list[str]:
+    return list(entries if isinstance(entries, Mapping) else _units(entries))
+
+
+def _noise_levels(noise: float | Mapping[str, Any] | None, outputs: States, states: Sequence[str] = (), expressions: bool = False) -> dict[str, Any]:
+    """Return the noise of the call by output: a number is that of each. By name, states may have one, too, and one may be an expression."""
+    names = _names_of(outputs)
+    levels = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(names, noise)
+    if unknown := set(levels) - {*names, *states}:
+        raise ValueError(f"noise of {', '.join(sorted(map(str, unknown)))}; the outputs are {', '.join(names)}")
+    keeps = expressions and isinstance(noise, Mapping)
+    return {name: level if keeps and is_expression(level) else noise_level(name, level) for name, level in levels.items()}
+
+
+def _noisy(entries: States, levels: Mapping[str, Any], key: str, function: Equation | None) -> dict[str, Entry]:
+    """Return entries of states or outputs with their noise."""
     # What a function computes has a unit in place of an expression.
     key = "unit" if function else key
     noisy: dict[str, Entry] = {}
@@ -555,13 +591,9 @@ def _noisy(entries: States, noise: float | Mapping[str, Any] | None, outputs: St
     return noisy
 
 
-def _option(name: str, value: int | None) -> list[str]:
-    return [] if value is None else [name, str(value)]
-
-
-def _json(path: Path) -> Json:
-    raw: Json = json.loads(path.read_text(encoding="utf-8"))
-    return raw
+def _option(name: str, value: int | None, least: int) -> list[str]:
+    """Return an option with a whole number; none without a value."""
+    return [] if value is None else [name, str(count(name[2:].replace("-", "_"), value, least))]
 
 
 def _study(model: Model, noise: Mapping[str, float]) -> str:
@@ -570,5 +602,5 @@ def _study(model: Model, noise: Mapping[str, float]) -> str:
     for number, name in enumerate(model.outputs, start=1):
         if name in noise:
             target = "sensor" if len(model.outputs) == 1 else f"sensor{number}"
-            effects.append(f'[[effect]]\nid = "sensor-noise"\ntarget = "{target}"\nmagnitudes = {{ std = {float(noise[name])!r} }}')
+            effects.append(f'[[effect]]\nid = "sensor-noise"\ntarget = "{target}"\nmagnitudes = {{ std = {noise[name]!r} }}')
     return "\n".join(effects) + "\n"

@@ -79,9 +79,8 @@ impl Verb for Compare {
             true => "on the whole of the record whose first two thirds were fitted",
             false => "on the validation record",
         };
-        deliver(write, || {
-            provenance.print(context, &json, || compare_document(&compared, what).text())
-        })
+        let text = || compare_document(&compared, what).text();
+        provenance.deliver(context, &json, write, text)
     }
 }
 

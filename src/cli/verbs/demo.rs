@@ -82,7 +82,7 @@ impl Verb for Demo {
             ));
             Ok(())
         };
-        deliver(write, || answer.print(context, &provenance))
+        answer.deliver(context, &provenance, write)
     }
 }
 

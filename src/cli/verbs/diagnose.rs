@@ -102,9 +102,7 @@ impl Verb for Diagnose {
             }
             Ok(folder.finish()?)
         };
-        let done = deliver(write, || {
-            provenance.print(context, &json, || found.text(&study))
-        })?;
+        let done = provenance.deliver(context, &json, write, || found.text(&study))?;
         Ok(match found.interrupted {
             true => ExitCode::from(STOPPED),
             false => done,

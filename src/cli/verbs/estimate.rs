@@ -81,7 +81,7 @@ impl Verb for Estimate {
                 answer.write(&folder, &provenance)?;
                 Ok(folder.finish()?)
             };
-            return deliver(write, || answer.print(context, &provenance));
+            return answer.deliver(context, &provenance, write);
         }
         if settings.draws > 0 {
             return Err(Failure::user(
@@ -114,7 +114,7 @@ impl Verb for Estimate {
             Ok(folder.finish()?)
         };
         let text = || together_document(study, &all, &names).text();
-        deliver(write, || provenance.print(context, &json, text))
+        provenance.deliver(context, &json, write, text)
     }
 }
 
@@ -126,14 +126,15 @@ pub(super) struct Answer<'a> {
 }
 
 impl Answer<'_> {
-    /// Prints the estimate.
-    pub fn print(
+    /// Writes the files and prints the estimate.
+    pub fn deliver(
         &self,
         context: &Context<'_>,
         provenance: &Provenance,
+        write: impl FnOnce() -> Result<(), Failure>,
     ) -> Result<ExitCode, Failure> {
         let json = provenance.on(self.estimate.json(self.study));
-        provenance.print(context, &json, || self.estimate.text(self.study))
+        provenance.deliver(context, &json, write, || self.estimate.text(self.study))
     }
 
     /// Writes `estimate.json`, `report.html`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.

@@ -67,9 +67,7 @@ impl Verb for Fit {
             }
             Ok(folder.finish()?)
         };
-        let done = deliver(write, || {
-            provenance.print(context, &json, || fit.text(&study))
-        })?;
+        let done = provenance.deliver(context, &json, write, || fit.text(&study))?;
         Ok(match fit.interrupted {
             true => ExitCode::from(STOPPED),
             false => done,

@@ -173,7 +173,7 @@ impl Verb for Reproduce {
             // Written last: it marks the folder as complete.
             Ok(folder.write("reproduce.json", &format!("{json:#}\n"))?)
         };
-        deliver(write, || provenance.print(context, &json, || text.clone()))
+        provenance.deliver(context, &json, write, || text.clone())
     }
 }
 
@@ -232,7 +232,9 @@ fn kept(
         }
     }
     context.ranks.wait();
-    Ok(Estimator::load(&path, context.projects)?)
+    let estimator = Estimator::load(&path, context.projects)?;
+    folder.seal("estimator.est", "reproduce")?;
+    Ok(estimator)
 }
 
 /// Returns whether the caller has stopped the training.

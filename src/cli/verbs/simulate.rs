@@ -46,8 +46,13 @@ impl Verb for Simulate {
         let given = parse_theta(&self.theta)?;
         let mut twin = study.twin().clone();
         let mut magnitudes = BTreeMap::new();
+        let noise = Noise::new(context.seed, "simulate", 0);
+        let drive = match &self.input {
+            Some(path) => self.columns.reader(&study).drive(path)?,
+            None => study.drives()?.draw(noise)?,
+        };
         if let Some(path) = &self.effect {
-            let effects = study.catalogue().read(path)?;
+            let effects = study.catalogue().read(path, drive.dt())?;
             magnitudes.extend(effects.iter().flat_map(Effect::given_by_parameter));
             twin = augment(twin, effects).in_file(path)?;
         }
@@ -60,11 +65,6 @@ impl Verb for Simulate {
             )));
         }
         let theta = complete(&twin.parameters(), &given, &magnitudes)?;
-        let noise = Noise::new(context.seed, "simulate", 0);
-        let drive = match &self.input {
-            Some(path) => self.columns.reader(&study).drive(path)?,
-            None => study.drives()?.draw(noise)?,
-        };
         self.check_inputs(&twin, &drive)?;
         let noise = if self.noise_free { Noise::OFF } else { noise };
         let outputs = twin.simulate(&theta, &drive, noise)?;

@@ -109,7 +109,7 @@ impl Verb for Withheld {
             // Written last: it marks the folder as complete.
             Ok(sealed.write("scorecard.json", &format!("{json:#}\n"))?)
         };
-        deliver(write, || provenance.print(context, &json, || card.text()))
+        provenance.deliver(context, &json, write, || card.text())
     }
 }
 

@@ -73,6 +73,39 @@ fn events_are_located_between_samples() {
     assert!(y.unwrap().iter().all(|y| *y >= 0.0));
 }
 
+/// A limit, a time or a condition that is no number is an error, as a rate is.
+#[test]
+fn what_has_no_number_ends_the_run() {
+    let text = |limits: &str, event: &str| {
+        format!(
+            "[parameters]\nk = {{ prior = [-1.0, 1.0] }}\n[states]\nx = {{ rate = \"-x\", start = 1.0{limits} }}\n\
+             [outputs]\ny = {{ value = \"x\" }}\n[[event]]\n{event}\nset = {{ x = 2 }}\n"
+        )
+    };
+    let drive = Drive::autonomous(0.1, 10).unwrap();
+    for (text, problem) in [
+        (
+            text("", "at = \"sqrt(k)\""),
+            "event 1 (at its times) has no number at t = 0 s",
+        ),
+        (
+            text("", "when = \"sqrt(k) > x\""),
+            "(when sqrt(k) > x) has no number",
+        ),
+        (text(", limits = [-9, \"sqrt(k)\"]", "at = 0.5"), "diverged"),
+    ] {
+        for rule in ["adaptive", "euler"] {
+            let twin = under(rule, &text);
+            assert!(twin.simulate(&[0.1], &drive, Noise::OFF).is_ok());
+            let error = twin.simulate(&[-0.1], &drive, Noise::OFF).unwrap_err();
+            assert!(
+                error.costs_one_run() && error.to_string().contains(problem),
+                "{error}"
+            );
+        }
+    }
+}
+
 /// Doses at times, of rows and between them, are those of an input that is added at its rows.
 #[test]
 fn doses_at_times_are_those_of_an_input() {

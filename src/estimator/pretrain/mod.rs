@@ -11,6 +11,7 @@ use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::network::{Checkpoints, History, NetworkError, Samples};
 use crate::progress::Progress;
 use crate::storage::files::write_result;
+use crate::storage::reading::dangling;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use crate::storage::{StorageError, sweep_beside};
 use ndarray::Array2;
@@ -262,7 +263,13 @@ impl Pretraining {
         let place = Self::work_folder(path);
         sweep_beside(path);
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
-            let problem = "exists already; choose another name, or remove it";
+            let problem = match dangling(path) {
+                Some(to) => format!(
+                    "it is a link to {}, which does not exist; remove it",
+                    to.display()
+                ),
+                None => "exists already; choose another name, or remove it".into(),
+            };
             return Err(EstimatorError::file(path, problem));
         }
         let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(None))?;
@@ -278,6 +285,7 @@ impl Pretraining {
         drop(lock);
         match &made {
             Ok(_) | Err(EstimatorError::Work(StorageError::Kept { .. })) => folder.remove()?,
+            Err(EstimatorError::Work(StorageError::Elsewhere { .. })) => drop(folder.remove()),
             // It would only stand in the way of the next call. What is wrong is said, not that it cannot be removed either.
             Err(error) if ends_for_good(error) || is_bare(&folder) => drop(folder.remove()),
             Err(_) => {}

@@ -102,15 +102,10 @@ impl Description {
         }
         let channels = signals.inputs.iter().chain(&signals.outputs);
         let channels = channels.map(|channel| channel.name.as_str());
-        let parameters_too = channels.chain(parameters.iter().map(|p| p.name.as_str()));
-        name::check_all("parameters, inputs and outputs together", parameters_too)?;
-        if signals
-            .inputs
-            .iter()
-            .chain(&signals.outputs)
-            .any(|c| c.name == "t")
-        {
-            return Err("a channel is called t, which is the time; rename it".into());
+        let mut all = channels.chain(parameters.iter().map(|p| p.name.as_str()));
+        name::check_all("parameters, inputs and outputs together", all.clone())?;
+        if all.any(|name| name == "t") {
+            return Err("a parameter or channel is called t, which is the time; rename it".into());
         }
         parameters.check().map_err(|error| error.to_string())?;
         let record = plan(&told.record)?;
@@ -273,6 +268,7 @@ mod tests {
             ("\"name\": \"y\"", "\"name\": \"u\"", "duplicate name u"),
             ("\"name\": \"y\"", "\"name\": \"k\"", "duplicate name k"),
             ("\"name\": \"y\"", "\"name\": \"t\"", "which is the time"),
+            ("\"name\": \"k\"", "\"name\": \"t\"", "which is the time"),
             ("60,", "60, \"samples\": 70,", "\"samples\" stands twice"),
         ] {
             assert!(GOOD.contains(from), "{from}");

@@ -4,7 +4,7 @@ use super::super::name;
 use crate::equations::Equations;
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, message};
-use crate::study::{RecordTable, StudyError, StudyFile};
+use crate::study::{RecordTable, Study, StudyError, StudyFile};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -150,21 +150,21 @@ impl Inside {
         if let Some(table) = needed.iter().find(|table| !told.contains_key(**table)) {
             return Err(format!("{table}: the twin has none; give one or more"));
         }
-        let equations = Equations::parse(&writer.text).map_err(|error| {
-            let place = writer.places.get(error.line() - 1);
-            let place = place.map_or("", String::as_str);
-            format!("{place}: {}", error.problem())
-        })?;
-        let file = StudyFile::parse(&writer.text, Path::new("the description"));
         // The lines are of a text that nobody has written.
-        let file = file.map_err(|error| match error {
-            StudyError::Syntax { line, message, .. } => {
-                let place = writer.places.get(line - 1).map_or("", String::as_str);
-                format!("{place}: {message}")
-            }
+        let at = |line: usize, problem: &str| {
+            let place = writer.places.get(line - 1).map_or("", String::as_str);
+            format!("{place}: {problem}")
+        };
+        let equations =
+            Equations::parse(&writer.text).map_err(|error| at(error.line(), error.problem()))?;
+        let wrong = |error| match error {
+            StudyError::Syntax { line, message, .. } => at(line, &message),
+            StudyError::At { line, error, .. } => at(line, &error.to_string()),
             other => message(&other.to_string()),
-        })?;
+        };
+        let file = StudyFile::parse(&writer.text, Path::new("the description")).map_err(wrong)?;
         check_files(&file.record)?;
+        Study::of_file(&file).map_err(wrong)?;
         Ok(Self {
             name: name.into(),
             file,
@@ -425,6 +425,13 @@ mod tests {
                 "study file",
             ),
             ("\"euler\"", "\"eulre\"", "unknown integrator"),
+            ("60", "0", "record: samples: samples = 0"),
+            ("0.05", "-1", "record: step: step = -1 s"),
+            (
+                "\"euler\"",
+                "\"euler\", \"substeps\": 0",
+                "record: substeps: substeps = 0; choose between",
+            ),
             ("\"rad\"", "\"\\u001b[2J\"", "outputs: the unit"),
             (
                 "{\"name\": \"pendulum\"",

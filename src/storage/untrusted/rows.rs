@@ -18,6 +18,8 @@ pub(crate) struct Rows<R> {
     next: usize,
     /// `true` if a carriage return is before it, to which a line feed belongs.
     after_return: bool,
+    /// `true` in a line that begins with `#`, between rows.
+    is_comment: bool,
     /// Line, from 1, that the last row begins in.
     line: usize,
 }
@@ -65,6 +67,7 @@ impl<R: Read> Rows<R> {
         };
         let reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
+            .comment(Some(b'#'))
             .delimiter(separator)
             .from_reader(bounded);
         Self {
@@ -73,6 +76,7 @@ impl<R: Read> Rows<R> {
             counted: 0,
             next: 1,
             after_return: false,
+            is_comment: false,
             line: 1,
         }
     }
@@ -107,14 +111,18 @@ impl<R: Read> Rows<R> {
             .text
             .len()
             .min(behind.done + (until - self.counted) as usize);
-        let mut begin = None;
+        // What was counted before ends with a row.
+        let (mut begin, mut at_start) = (None, true);
         for &byte in &behind.text[behind.done..end] {
-            let is_feed = byte == b'\n';
-            if byte == b'\r' || is_feed && !self.after_return {
+            let ends = matches!(byte, b'\r' | b'\n');
+            if byte == b'\r' || byte == b'\n' && !self.after_return {
                 self.next += 1;
-            } else if !is_feed && begin.is_none() {
+            }
+            self.is_comment = !ends && (self.is_comment || at_start && byte == b'#');
+            if !ends && !self.is_comment && begin.is_none() {
                 begin = Some(self.next);
             }
+            at_start = ends;
             self.after_return = byte == b'\r';
         }
         self.line = begin.unwrap_or(self.line);
@@ -157,6 +165,8 @@ mod tests {
             ("t\r\n1\r\n\r\n2\r\n", &[2, 4]),
             ("t\r1\r\r2", &[2, 4]),
             ("t\n\"1\n\n\"\n2\n\r\n3", &[2, 5, 7]),
+            ("# a\nt\n# b\n1\n\n#\r\n# c\n2\n# d", &[4, 8]),
+            ("#\r\nt\r\n1\r\n# #\r\n\"2\n#\"\n3", &[3, 5, 7]),
         ] {
             // However the bytes come.
             for size in [1, 2, 100] {

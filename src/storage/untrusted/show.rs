@@ -89,6 +89,15 @@ fn short_quotes(text: &str) -> String {
     parts.collect::<Vec<_>>().join("`")
 }
 
+/// Words that are too long, by their beginnings, likewise.
+pub(crate) fn short_words(text: &str) -> String {
+    let words = text.split(' ').map(|word| match word.chars().nth(QUOTED) {
+        None => Cow::Borrowed(word),
+        Some(_) => Cow::Owned(excerpt(word)),
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
 /// Numbers of more digits than a message needs, to six of them: a parser writes all that a number has.
 fn short_numbers(text: &str) -> String {
     let is_part = |c: char| c.is_alphanumeric() || matches!(c, '.' | '_');
@@ -198,6 +207,8 @@ mod tests {
         ));
         assert!(key.ends_with(" …`, expected `a`"), "{key}");
         assert!(key.chars().count() < 2 * QUOTED, "{key}");
+        let name = short_words(&format!("no twin is called {}; name one", "x".repeat(5000)));
+        assert!(name.ends_with("xxx …; name one"), "{name}");
     }
 
     #[test]

@@ -3,13 +3,15 @@
 use super::manifest::{CHECKSUMS, Manifest};
 use super::piece;
 use crate::storage::files::{replace, write_new};
+use crate::storage::names::is_unfinished;
 use crate::storage::place::check_place;
+use crate::storage::reading::{checksum_of_read, dangling};
 use crate::storage::unfinished;
 use crate::storage::untrusted::{check_file, check_folder, message, read_kept_text};
 use crate::storage::{NewFolder, StorageError, sweep_beside};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -129,6 +131,25 @@ impl WorkFolder {
         }
     }
 
+    /// Notes the checksum of a file of the folder, as it was read, in the manifest; where one is noted, refuses another file.
+    pub(crate) fn seal(&self, name: &str, verb: &'static str) -> Result<(), StorageError> {
+        let (_, manifest) = Self::find(&self.path, verb)?;
+        let path = self.file(name);
+        let read = checksum_of_read(&path);
+        let mut sums = manifest.checksums().cloned().unwrap_or_else(|| json!({}));
+        match sums.get(name).and_then(Value::as_str) {
+            Some(noted) if Some(noted) == read.as_deref() => Ok(()),
+            Some(_) => Err(StorageError::Piece {
+                path,
+                reason: "its bytes are not those that this folder was made with".into(),
+            }),
+            None => {
+                sums[name] = json!(read);
+                self.finish(&manifest, sums)
+            }
+        }
+    }
+
     /// Adds the checksums of all pieces to the manifest: the work is finished.
     pub(crate) fn finish(&self, manifest: &Manifest, checksums: Value) -> Result<(), StorageError> {
         self.write(
@@ -224,11 +245,32 @@ impl WorkFolder {
     }
 }
 
+/// Returns whether a folder of work has anything that is finished: a file other than those that it begins with.
+pub(crate) fn has_pieces(folder: &Path) -> bool {
+    let entries = folder.read_dir().into_iter().flatten().flatten();
+    let is_piece = |entry: std::fs::DirEntry| match entry.file_type() {
+        Ok(kind) if kind.is_dir() => has_pieces(&entry.path()),
+        Ok(_) => {
+            let name = entry.file_name();
+            !name
+                .to_str()
+                .is_some_and(|name| [MANIFEST, LOCK].contains(&name) || is_unfinished(name))
+        }
+        Err(_) => false,
+    };
+    entries.into_iter().any(is_piece)
+}
+
 /// Reads the manifest of a folder of `verb`; else the reason why it has none, in words.
 fn read_manifest(path: &Path, verb: &'static str) -> Result<Manifest, String> {
     match path.symlink_metadata() {
         _ if path.is_dir() => {}
-        Ok(_) => return Err("it is no folder".into()),
+        Ok(_) => {
+            return Err(match dangling(path) {
+                Some(to) => format!("it is a link to {}, which does not exist", to.display()),
+                None => "it is no folder".into(),
+            });
+        }
         Err(_) => return Err("it does not exist".into()),
     }
     let text = read_kept_text(&path.join(MANIFEST), MOST).map_err(|error| match error.kind() {
@@ -253,7 +295,7 @@ fn appears(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
+    use crate::storage::reading::Reading;
     use std::fs;
 
     fn manifest(runs: u32) -> Manifest {
@@ -264,6 +306,28 @@ mod tests {
         WorkFolder::open(path, &manifest(runs), &["runs"], |new| {
             new.write("start.txt", b"a").map(|()| None)
         })
+    }
+
+    /// A file that pieces depend on is that of the folder, in every call.
+    #[test]
+    fn a_sealed_file_that_was_replaced_is_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("work");
+        let folder = open(&path, 2).unwrap();
+        assert!(has_pieces(&path), "the file that it was filled with");
+        let read = |folder: &WorkFolder| {
+            let mut reading = Reading::open(&folder.file("start.txt")).unwrap();
+            io::copy(&mut reading, &mut io::sink()).unwrap();
+            folder.seal("start.txt", "reproduce")
+        };
+        read(&folder).unwrap();
+        read(&open(&path, 2).unwrap()).unwrap();
+        fs::write(path.join("start.txt"), "b").unwrap();
+        let error = read(&open(&path, 2).unwrap()).unwrap_err().to_string();
+        assert!(
+            error.contains("start.txt") && error.contains("remove it"),
+            "{error}"
+        );
     }
 
     #[test]

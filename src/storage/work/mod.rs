@@ -16,6 +16,7 @@ mod ranks;
 mod share;
 
 pub use folder::WorkFolder;
+pub(crate) use folder::has_pieces;
 pub(crate) use manifest::{Manifest, checksum};
 pub(crate) use pieces::{Piece, Pieces};
 pub(crate) use ranks::Ranks;

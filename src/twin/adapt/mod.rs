@@ -137,14 +137,9 @@ fn adapt_equations(
         let (mean, std) = match level {
             StartLevel::Declared { mean, std, at } => {
                 if let (Some(at), Some(other)) = (at, begins.or(at)) {
-                    let remedy = "all states start at one time: give the same at, once or in each";
                     if at != other {
-                        return Err(TwinError::Value {
-                            table: "start",
-                            name: name.into(),
-                            value: at,
-                            remedy,
-                        });
+                        let name = name.into();
+                        return Err(TwinError::Begins { name, at, other });
                     }
                     begins = Some(at);
                 }

@@ -14,7 +14,7 @@ const SAME_TIME: f64 = 1e-6;
 pub(super) struct EventMemory {
     /// Time of that sample, and the conditions that were true there at the centre.
     before: Option<(f64, Vec<bool>)>,
-    /// A sentence about events without end.
+    /// A sentence about events without end, or without a number.
     pub fault: Option<String>,
 }
 
@@ -54,6 +54,13 @@ impl Workspace {
             between: now.between.filter(|_| !is_discrete),
             ..*now
         };
+        if let Some(event) = calls.undefined(&way, &x[..n]) {
+            let (name, at) = (event.name(), number(way.t));
+            let remedy = "give it one there, or leave these parameters out of the prior";
+            self.events.fault = Some(format!("{name} has no number at t = {at} s; {remedy}"));
+            x.fill(f64::NAN);
+            return;
+        }
         let times = calls.times(&way, &x[..n], rule);
         let events = EventsOfWay {
             calls,

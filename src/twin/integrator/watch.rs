@@ -47,6 +47,16 @@ impl EventCalls<'_> {
         margins
     }
 
+    /// Returns the event that cannot be told at this point of numbers.
+    pub fn undefined(&self, now: &Now<'_>, x: &[f64]) -> Option<&Event> {
+        let mut found = None;
+        (self.inside)(now, x, &mut |own| {
+            let is_undefined = |event: &&Event| event.is_undefined(own, &x[..self.states]);
+            found = self.list.iter().find(is_undefined);
+        });
+        found.filter(|_| x.iter().all(|x| x.is_finite()))
+    }
+
     fn change(&self, event: usize, now: &Now<'_>, x: &mut [f64]) {
         let seen = x.to_vec();
         (self.inside)(now, &seen, &mut |own| {

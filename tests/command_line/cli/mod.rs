@@ -130,6 +130,34 @@ fn simulations_repeat_whatever_the_threads() {
 }
 
 #[test]
+fn studies_that_score_the_same_have_no_winner() {
+    let text = |name: &str| {
+        format!(
+            "[twin]\nname = \"{name}\"\n[parameters]\nk = {{ prior = [0.1, 1.0] }}\n[states]\nx = {{ rate = \"-k*x\", start = 1.0 }}\n\
+             [outputs]\ny = {{ value = \"x\", noise = 0.01 }}\n[record]\nstep = 0.5\nsamples = 30\n"
+        )
+    };
+    let (a, b) = (
+        file("tie-a.toml", &text("a")),
+        file("tie-b.toml", &text("b")),
+    );
+    let slow = text("slow").replace("-k*x", "-0.01*k*x");
+    let (slow, record) = (file("tie-slow.toml", &slow), at("tie.csv"));
+    done(&[
+        "simulate", "--study", &a, "--theta", "k=0.5", "--out", &record,
+    ]);
+    let compared =
+        |studies: [&str; 2]| done(&["compare", studies[0], studies[1], "--validation", &record]);
+    let tied = compared([&a, &b]);
+    assert!(
+        tied.starts_with("tie-a and tie-b predict equally well:"),
+        "{tied}"
+    );
+    let won = compared([&slow, &a]);
+    assert!(won.starts_with("tie-a predicts best:"), "{won}");
+}
+
+#[test]
 fn an_input_file_and_an_effect_shape_the_record() {
     let input = file("u.csv", "t,u\n0,1\n0.5,1\n1,2\n1.5,0\n");
     let effect = file(

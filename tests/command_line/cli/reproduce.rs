@@ -248,3 +248,22 @@ fn the_help_teaches_and_wrong_scenarios_are_refused() {
     }
     refused(&small(&["--scenario", "5"]), &["--scenario", "uniform"]);
 }
+
+/// Records of one folder are all scored with its own estimator.
+#[test]
+fn a_foreign_estimator_is_refused_and_made_again_where_it_is_removed() {
+    let [own, other] = ["sealed", "foreign"].map(at);
+    let table = |out: &str| fs::read_to_string(Path::new(out).join("reproduce.json")).unwrap();
+    let estimator = |out: &str| Path::new(out).join("estimator.est");
+    done(&small(&["--out", &own]));
+    done(&small(&["--out", &other, "--seed", "9"]));
+    let before: Value = serde_json::from_str(&table(&own)).unwrap();
+    fs::copy(estimator(&other), estimator(&own)).unwrap();
+    fs::remove_file(Path::new(&own).join("runs/0001.json")).unwrap();
+    let again = small(&["--out", &own]);
+    refused(&again, &["estimator.est", "cannot be used", "remove it"]);
+    fs::remove_file(estimator(&own)).unwrap();
+    done(&again);
+    let after: Value = serde_json::from_str(&table(&own)).unwrap();
+    assert_eq!(timeless(before), timeless(after));
+}

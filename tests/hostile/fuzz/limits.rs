@@ -73,7 +73,7 @@ fn devices_and_pipes_without_end() {
     assert!(refused(8 * MIB, || StudyFile::read(zero)).contains("longer than 1 MiB"));
     assert!(
         refused(8 * MIB, || truetwin::effect::Catalogue::default()
-            .read(zero))
+            .read(zero, 1.0))
         .contains("longer than 1 MiB")
     );
     let place = place();

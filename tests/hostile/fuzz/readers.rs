@@ -111,7 +111,7 @@ pub fn equations(data: &[u8]) -> Result<(), String> {
 /// An effect file, up to the twin that has the effects.
 pub fn effect(data: &[u8]) -> Result<(), String> {
     let found = Catalogue::default()
-        .read(&file("effect.toml", data))
+        .read(&file("effect.toml", data), 1.0)
         .map_err(text)?;
     let Some(study) = projects()
         .iter()

@@ -44,9 +44,13 @@ fn bad_files_are_refused_in_one_line() {
             "[[effect]]\nid = \"state-ceiling\"\ntarget = \"h1\"\nto = \"h2\"\nmagnitudes = { spill = 1.5 }".into(),
             vec!["line 5", "spill = 1.5", "[0, 1]"],
         ),
+        (
+            "[[effect]]\nid = \"sensor-delay\"\ntarget = \"sensor\"\nmagnitudes = { delay = 40 }".into(),
+            vec!["line 4", "delay = 40 s, but at a step of 0.5 s at most 31.5 s are kept"],
+        ),
     ] {
         std::fs::write(&path, &text).unwrap();
-        let error = Catalogue::default().read(&path).unwrap_err().to_string();
+        let error = Catalogue::default().read(&path, 0.5).unwrap_err().to_string();
         assert!(
             error.contains("bad.toml") && !error.contains('\n') && !error.contains(", ,"),
             "{error}"
@@ -56,7 +60,7 @@ fn bad_files_are_refused_in_one_line() {
         }
     }
     let missing = Catalogue::default()
-        .read(&folder.path().join("none.toml"))
+        .read(&folder.path().join("none.toml"), 0.5)
         .unwrap_err();
     assert!(missing.to_string().contains("none.toml"), "{missing}");
 }

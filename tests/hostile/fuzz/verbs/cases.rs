@@ -381,10 +381,20 @@ fn words(study: &str, random: &mut ChaCha8Rng) -> Vec<String> {
         15 => format!("resample r.csv --step {}", NUMBERS.choose(random).unwrap()),
         16 => format!("bank {twin} --size 6"),
         17 => format!("effects {twin}"),
-        18 => "compare s.toml s2.toml --record r.csv".to_owned(),
+        18 => match random.gen_range(0..6) {
+            0 => "compare s.toml s.toml --record r.csv --validation r2.csv".to_owned(),
+            1 => format!("export {twin}"),
+            2 => format!("pretrain {twin} --bank-size 100 --epochs 1 --out o.est"),
+            3 => "estimate r.csv --estimator e.est".to_owned(),
+            4 => format!("withheld {twin} --trials 1 --detection-only --out o"),
+            _ => format!("reproduce {twin} --runs 1 --bank-size 100 --epochs 1 --out o"),
+        },
         _ => format!("diagnose r.csv {twin} --quick"),
     };
-    let takes_out = !call.starts_with("check") && !call.starts_with("effects");
+    let takes_out = !call.contains(" --out ")
+        && !["check", "effects"]
+            .iter()
+            .any(|verb| call.starts_with(verb));
     let must = ["bank", "resample", "features"]
         .iter()
         .any(|verb| call.starts_with(verb));

@@ -1,0 +1,106 @@
+"""Texts of the program in the words of the user: what was passed in place of temporary files, positions in place of their rows."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ._numbers import one_line
+
+#: Rows of a file in a finding, which shows the first of many.
+_ROWS = re.compile(r"(?P<before>\bin rows )(?P<rows>\d+(?:, \d+)*(?:, …)?)")
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a written file.
+
+    Parameters
+    ----------
+    first : int
+        Row of the file, from 1, that has the first sample.
+    samples : int
+        Number of samples.
+    index : index of a data frame, optional
+        Its labels belong to the rows, unless they are their positions.
+    """
+
+    first: int
+    samples: int
+    index: Any = None
+
+    def positions(self, rows: str) -> str:
+        """Return rows as positions in the data; a row of the header stays as it is."""
+        positions = [int(row) - self.first for row in re.findall(r"\d+", rows)]
+        if not all(0 <= position < self.samples for position in positions):
+            return rows
+        more = ", …" if rows.endswith("…") else ""
+        labels = [one_line(str(self.index[position])) for position in positions] if self.index is not None else []
+        index = f"; index {', '.join(labels)}" if labels and labels != [str(position) for position in positions] else ""
+        return f"{', '.join(map(str, positions))}{more} (counted from 0{index})"
+
+
+class Names:
+    """The words for the files and the simulator of one call.
+
+    Parameters
+    ----------
+    folder : Path
+        Temporary folder of the call; its files have the names that the user reads.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._words: dict[str, str] = {}
+        self._rows: dict[str, Rows] = {}
+        self.hide(folder)
+
+    def hide(self, folder: str | os.PathLike[str]) -> None:
+        """Leave a folder out before the names of its files."""
+        self.say(f"{os.fspath(folder)}{os.sep}", "")
+
+    def say(self, text: str, word: str) -> None:
+        """Say a word in place of a text, as it is in messages, in JSON and in pages."""
+        self._words |= dict.fromkeys((text, json.dumps(text, ensure_ascii=False)[1:-1], html.escape(text)), word)
+
+    def write(self, name: str, rows: Rows) -> Path:
+        """Return the path of a new file of a record."""
+        self._rows[name] = rows
+        return self._folder / name
+
+    def plain(self, text: str) -> str:
+        """Return a result in the words of the user."""
+        # The longest first: a file of its own word is in a folder that is left out.
+        for part in sorted(self._words, key=len, reverse=True):
+            text = text.replace(part, self._words[part])
+        return text
+
+    def message(self, text: str) -> str:
+        """Return messages in the words of the user, with positions for the rows of written records."""
+        for name, rows in self._rows.items():
+            place = re.escape(str(self._folder / name))
+            text = _moved(rf"(?P<before>{place}(?:, |: )row )(?P<rows>\d+)", rows, text)
+        return self.plain(text).replace("--theta", "parameters")
+
+    def finding(self, name: str, text: str) -> str:
+        """Return a message about the record `name`, which does not name it."""
+        rows = self._rows.get(name)
+        return text if rows is None else _moved(_ROWS, rows, text)
+
+    def unfinished(self, text: bytes) -> int:
+        """Return where a path of the temporary folder begins at the end of a text; its length if none does."""
+        folder = os.fsencode(self._folder)
+        line = text.rfind(b"\n") + 1
+        whole = text.find(folder, line)
+        begins = (at for at in range(max(line, len(text) - len(folder)), len(text)) if folder.startswith(text[at:]))
+        return whole if whole >= 0 else next(begins, len(text))
+
+
+def _moved(place: str | re.Pattern[str], rows: Rows, text: str) -> str:
+    """Return a text with positions in place of rows."""
+    return re.sub(place, lambda found: found["before"] + rows.positions(found["rows"]), text)
