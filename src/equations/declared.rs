@@ -84,6 +84,10 @@ impl Declared {
         }
         if let Some(value) = keys.get("factor") {
             match super::place::number(value.get_ref()) {
+                Some(_) if self.known.contains(entry.name) => {
+                    let problem = "a known level is not fitted, and has no factor; remove one of known and factor";
+                    return table.error(problem);
+                }
                 Some(factor) if factor > 1.0 && factor.is_finite() => {
                     self.factors.insert(entry.name.into(), factor);
                 }

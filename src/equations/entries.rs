@@ -4,7 +4,7 @@ use super::error::EquationsError;
 use super::expression::{Callable, is_name};
 use super::place::{PlacedExpression, SourceText, in_order, number};
 use crate::setting::did_you_mean;
-use crate::storage::untrusted::{excerpt, hidden};
+use crate::storage::untrusted::{check_name, excerpt, hidden};
 use crate::twin::Interval;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -108,6 +108,9 @@ impl<'a, 't> TableEntry<'a, 't> {
             return self.error(format!(
                 "\"{shown}\" cannot stand in an expression; use letters, digits and _, a letter first"
             ));
+        }
+        if let Err(problem) = check_name(name) {
+            return self.error(problem);
         }
         if WORDS.contains(&name) || Callable::named(name).is_some() {
             return self.error(format!(

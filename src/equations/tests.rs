@@ -134,6 +134,10 @@ fn faults_are_one_line_with_their_place() {
             "line 6, column 4: unknown function \"sinn\"",
         ),
         (
+            "[states]\nh = { rate = \"1\", noise = { std = 0.1, known = true, factor = 2.0 } }\n",
+            "line 4, column 27: a known level is not fitted, and has no factor",
+        ),
+        (
             "[states]\nh = { rate = \"1\", nois = 1 }\n",
             "line 4, column 19: unknown key \"nois\" (did you mean \"noise\"?)",
         ),

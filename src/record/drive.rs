@@ -115,7 +115,15 @@ impl Drive {
             let middle = (steps.len() - 1) / 2;
             drive.dt = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         }
-        Ok(drive)
+        // Times that differ by less than their last digit would be one.
+        let size = first.abs().max(last.abs());
+        match is_repeated && drive.dt < 2.0 * f64::EPSILON * size {
+            true => Err(RecordError::Resolution {
+                step: drive.dt,
+                size,
+            }),
+            false => Ok(drive),
+        }
     }
 
     /// The same drive, its first row at this time on the record's own clock, in seconds. Equations see that clock: `Now::t` of row k is
@@ -473,6 +481,9 @@ mod tests {
             let error = Drive::with_times(&times, Signal::zeros((3, 0))).unwrap_err();
             assert!(error.to_string().contains("time must increase"), "{error}");
         }
+        let fine: Vec<f64> = (0..9).map(|k| 1.7e9 + 1e-7 * f64::from(k)).collect();
+        let error = Drive::with_times(&fine, Signal::zeros((9, 0))).unwrap_err();
+        assert!(matches!(error, RecordError::Resolution { .. }), "{error}");
         let error = Drive::with_times(&[1.0; 3], Signal::zeros((3, 0))).unwrap_err();
         assert!(error.to_string().contains("at least two times"), "{error}");
     }

@@ -1,6 +1,7 @@
 //! Errors of drives, records and their files.
 
 use super::channels::LARGEST;
+use crate::math::three_digits;
 use crate::setting::{count, number};
 use crate::storage::files::with_remedy;
 use crate::storage::untrusted::excerpt;
@@ -13,6 +14,18 @@ pub enum RecordError {
     /// A step that is not positive, not finite, or too small for a normal number.
     #[error("step = {} s; choose a positive number of seconds, at least 2.3e-308", number(*.0))]
     Step(f64),
+    /// Times with more digits than a number has.
+    #[error(
+        "steps of {} s at times of {} s, whose last digits round to one time; let time begin at 0",
+        number(three_digits(*step)),
+        number(three_digits(*size))
+    )]
+    Resolution {
+        /// Step that is left, in seconds.
+        step: f64,
+        /// Largest time, in seconds.
+        size: f64,
+    },
     /// No sample at all.
     #[error("no samples; at least one is needed")]
     Empty,

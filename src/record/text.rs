@@ -28,23 +28,18 @@ impl<'a> Text<'a> {
             .build(file);
         let mut reader = BufReader::new(decoder);
         let mut start = Vec::new();
-        let mut header = 0..0;
-        // Empty lines and comments before the header are none.
-        let is_none = |line: &[u8]| line.is_empty() || line[0] == b'#';
-        while is_none(start[header.clone()].trim_ascii()) {
-            let before = start.len();
-            let left = MOST_START.saturating_sub(before as u64);
+        while header(&start).is_empty() {
+            let left = MOST_START.saturating_sub(start.len() as u64);
             if reader.by_ref().take(left).read_until(b'\n', &mut start)? == 0 {
                 break;
             }
-            header = before..start.len();
         }
         if start.contains(&0) {
             let remedy = "save it as UTF-8 text, or as UTF-16 with a byte-order mark";
             return Ok(Err(format!("the file is UTF-16 or binary; {remedy}")));
         }
         Ok(Ok(Self {
-            separator: separator(&start[header]),
+            separator: separator(header(&start)),
             text: Box::new(Cursor::new(start).chain(reader)),
         }))
     }
@@ -58,15 +53,18 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Returns the most frequent separator of a header, outside quotes; lines may end with a carriage return alone.
-fn separator(text: &[u8]) -> u8 {
+/// Returns the first line that is neither empty nor a comment; none if there is none yet.
+fn header(text: &[u8]) -> &[u8] {
+    let mut lines = text.split(|byte| matches!(byte, b'\r' | b'\n'));
+    let is_none = |line: &&[u8]| line.trim_ascii().is_empty() || line[0] == b'#';
+    lines.find(|line| !is_none(line)).unwrap_or_default()
+}
+
+/// Returns the most frequent separator of a header, outside quotes.
+fn separator(header: &[u8]) -> u8 {
     let mut counts = SEPARATORS.map(|(byte, _)| (byte, 0));
     let mut is_quoted = false;
-    let is_end = |byte: &u8| matches!(byte, b'\r' | b'\n');
-    for byte in text.iter().skip_while(|byte| is_end(byte)) {
-        if is_end(byte) && !is_quoted {
-            break;
-        }
+    for byte in header {
         is_quoted ^= *byte == b'"';
         if let Some((_, count)) = counts.iter_mut().find(|(b, _)| b == byte)
             && !is_quoted
@@ -174,6 +172,7 @@ mod tests {
             ("t,a;y\n", b';'),
             ("# a, b, c\n\nt;y\n", b';'),
             ("\rt;u;y\r0,5;1,5;2,5\r1,0;1,0;2,0\r", b';'),
+            ("# a,b\rt;u;y\r0,5;1,5;2,5\r", b';'),
         ] {
             assert_eq!(decoded(header.as_bytes()).1, expected, "{header}");
         }

@@ -206,14 +206,10 @@ impl Study {
             });
         }
         // Which effects a twin can have is asked of it: of a program, too.
-        let lets_any = || {
-            self.effects()
-                .iter()
-                .any(|effect| library.lets(effect.key()))
-        };
-        match library.only.is_empty() || lets_any() {
-            true => Ok(()),
-            false => Err(StudyError::NoEffects),
+        let is_both = !library.only.is_empty() && !library.without.is_empty();
+        match is_both && library.contradicts_itself(&self.effects()) {
+            true => Err(StudyError::NoEffects),
+            false => Ok(()),
         }
     }
 }

@@ -224,7 +224,11 @@ impl RecordPlan {
         if inputs.iter().all(|other| other.name != usual) {
             names.push(&usual);
         }
-        let drive = RecordReader::default().input(path, &names)?;
+        let drive = (RecordReader::default().input(path, &names)).map_err(|error| match error {
+            // No other names are taken here.
+            RecordError::Columns { .. } => StudyError::Plan(error.to_string()),
+            error => error.into(),
+        })?;
         check_one_step(path, &drive)?;
         let (step, samples) = (drive.dt(), drive.samples());
         if (step - self.step).abs() > UNIFORM * self.step || samples != self.samples {

@@ -1,6 +1,6 @@
 //! Tables of a study file.
 
-use crate::effect::{EffectKey, EffectPattern};
+use crate::effect::{Effect, EffectKey, EffectPattern};
 use crate::record::Columns;
 use crate::study::input_plan::PlannedInputs;
 use crate::twin::{Hold, Integrator, Interval};
@@ -73,6 +73,10 @@ fn some_patterns<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<EffectPattern
     }
 }
 
+fn named(list: &[EffectPattern], key: &EffectKey) -> bool {
+    list.iter().any(|pattern| pattern.matches(key))
+}
+
 impl Library {
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
@@ -80,8 +84,15 @@ impl Library {
 
     /// Returns whether a diagnosis may name this effect.
     pub fn lets(&self, key: &EffectKey) -> bool {
-        let named = |list: &[EffectPattern]| list.iter().any(|pattern| pattern.matches(key));
-        (self.only.is_empty() || named(&self.only)) && !named(&self.without)
+        (self.only.is_empty() || named(&self.only, key)) && !named(&self.without, key)
+    }
+
+    /// Returns whether all of these effects that `only` names stand in `without`, too.
+    pub fn contradicts_itself(&self, effects: &[Effect]) -> bool {
+        let mut only = (effects.iter().map(Effect::key)).filter(|key| named(&self.only, key));
+        let first = only.next();
+        first.is_some_and(|key| named(&self.without, key))
+            && only.all(|key| named(&self.without, key))
     }
 }
 

@@ -58,14 +58,14 @@ impl Verb for Bank {
         };
         context.ranks.wait();
         let clock = Instant::now();
-        plan.fill(&self.out, share, context.progress)?;
+        let own = plan.fill(&self.out, share, context.progress)?.made;
         context.ranks.wait();
         if !context.ranks.is_root() {
             return Ok(ExitCode::SUCCESS);
         }
         let seconds = clock.elapsed().as_secs_f64();
         let filled = plan.finish(&self.out)?;
-        let made = filled.rows.saturating_sub(before);
+        let made = own.max(filled.rows.saturating_sub(before));
         let rate = made as f64 / seconds;
         let folder = self.out.display();
         let json = json!({

@@ -29,10 +29,10 @@ enum ScenarioArgument {
     /// The paper's second point outside the prior, that of its figures (OOD 2)
     #[value(name = "2")]
     Second,
-    /// Drawn from the physical bounds
+    /// Drawn from the physical bounds (also 3)
     #[value(name = "uniform", alias = "3")]
     Uniform,
-    /// Twelve fixed points, six in the prior and six outside it: errors and coverage at each
+    /// Twelve fixed points, six in the prior and six outside it: errors and coverage at each (also 4)
     #[value(name = "grid", alias = "4")]
     Grid,
 }

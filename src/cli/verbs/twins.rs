@@ -144,7 +144,7 @@ impl Verb for Export {
         let study = context.study(&self.subject)?;
         let Some(text) = study.text() else {
             return Err(Failure::user(format!(
-                "the twin {} has no text, its equations are compiled; `truetwin new` writes a file to begin with",
+                "the twin {} has no equations as text; `truetwin new` writes a file to begin with",
                 study.name()
             )));
         };

@@ -59,6 +59,8 @@ pub struct Filled {
     pub of: usize,
     /// Simulations in the folder.
     pub rows: usize,
+    /// Simulations of shards that this call has made, also in place of damaged ones.
+    pub made: usize,
 }
 
 impl BankPlan {
@@ -83,16 +85,17 @@ impl BankPlan {
         let manifest = self.manifest()?;
         let folder = WorkFolder::open::<EstimatorError>(path, &manifest, &[SHARDS], |_| Ok(None))?;
         let filled = self.filled(&folder, &manifest, share, &prior, progress);
-        filled.inspect_err(|error| {
+        let made = filled.inspect_err(|error| {
             // It would only stand in the way of the next call. One that is stopped may have others beside it.
             if !matches!(error, EstimatorError::Cancelled(_)) {
                 folder.remove_bare(SHARDS);
             }
         })?;
-        finish(path, manifest)
+        let filled = finish(path, manifest)?;
+        Ok(Filled { made, ..filled })
     }
 
-    /// Makes the shards of a share that are missing.
+    /// Makes the shards of a share that are missing; returns the number of their simulations.
     fn filled(
         &self,
         folder: &WorkFolder,
@@ -100,7 +103,7 @@ impl BankPlan {
         share: Share,
         prior: &Prior,
         progress: &Progress,
-    ) -> Result<(), EstimatorError> {
+    ) -> Result<usize, EstimatorError> {
         let shards = Shards::list(folder.clone(), manifest.clone())?;
         let mine = || (0..shards.of).filter(|number| share.takes(*number));
         let stage = progress.stage("kept shards", mine().count());
@@ -119,7 +122,7 @@ impl BankPlan {
                 file::npz(&draws).map_err(|error| EstimatorError::io(folder.path(), error))?;
             shards.add(number, &bytes)?;
         }
-        Ok(())
+        Ok(rows)
     }
 
     /// Returns the progress of the folder; a complete one gets the checksums of its shards.
@@ -159,6 +162,7 @@ fn finish(path: &Path, manifest: Manifest) -> Result<Filled, EstimatorError> {
         there: shards.there.len(),
         of: shards.of,
         rows: shards.there.keys().map(|n| shards.rows(*n).count()).sum(),
+        made: 0,
     })
 }
 

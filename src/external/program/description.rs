@@ -172,7 +172,7 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
     };
     if !(step > 0.0 && step.is_normal()) || samples == 0 {
         return Err(format!(
-            "record: step = {} s, samples = {samples}; both must be positive",
+            "record: step = {} s, samples = {samples}; choose at least one sample, and a step of at least 2.3e-308 s",
             number(step)
         ));
     }

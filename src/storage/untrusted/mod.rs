@@ -10,7 +10,8 @@ mod show;
 pub(crate) use keyed::{Keyed, all_keyed, keyed};
 pub(crate) use rows::Rows;
 pub(crate) use show::{
-    check_names, excerpt, hidden, line, message, one_line, printable, quoted, short_words,
+    check_name, check_names, excerpt, hidden, line, message, one_line, printable, quoted,
+    short_words,
 };
 
 use super::reading::Reading;

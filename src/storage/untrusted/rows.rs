@@ -18,20 +18,42 @@ pub(crate) struct Rows<R> {
     next: usize,
     /// `true` if a carriage return is before it, to which a line feed belongs.
     after_return: bool,
-    /// `true` in a line that begins with `#`, between rows.
-    is_comment: bool,
     /// Line, from 1, that the last row begins in.
     line: usize,
 }
 
-/// Gives no more bytes than the row that is being read may have.
+/// Gives no more bytes than the row that is being read may have. Lines end with feeds alone, and comments are empty lines.
 struct Bounded<R> {
     from: R,
     given: u64,
     row: Rc<Cell<u64>>,
-    /// Bytes given and not counted yet, behind those that are done.
+    /// Bytes read and not counted yet, behind those that are done; 0 in comments.
     text: Vec<u8>,
     done: usize,
+    at: PlaceInText,
+}
+
+/// Place of a byte of a text.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum PlaceInText {
+    Start,
+    Line,
+    Quotes,
+    Comment,
+}
+
+impl PlaceInText {
+    /// Returns the place of the byte behind this one.
+    fn behind(self, byte: u8) -> Self {
+        match (self, byte) {
+            (Self::Quotes, b'"') => Self::Line,
+            (Self::Quotes, _) => Self::Quotes,
+            (_, b'\r' | b'\n') => Self::Start,
+            (Self::Start, b'#') | (Self::Comment, _) => Self::Comment,
+            (_, b'"') => Self::Quotes,
+            _ => Self::Line,
+        }
+    }
 }
 
 impl<R: Read> Read for Bounded<R> {
@@ -45,6 +67,21 @@ impl<R: Read> Read for Bounded<R> {
         self.text.drain(..self.done);
         self.done = 0;
         self.text.extend_from_slice(&to[..read]);
+        let is_odd = |byte: &u8| matches!(byte, b'"' | b'#' | b'\r');
+        let begins_odd = matches!(self.at, PlaceInText::Quotes | PlaceInText::Comment);
+        if begins_odd || to[..read].iter().any(is_odd) {
+            let end = self.text.len() - read;
+            for (own, byte) in self.text[end..].iter_mut().zip(&mut to[..read]) {
+                self.at = self.at.behind(*byte);
+                match self.at {
+                    PlaceInText::Comment => (*own, *byte) = (0, b'\n'),
+                    PlaceInText::Start => *byte = b'\n',
+                    _ => {}
+                }
+            }
+        } else if let Some(last) = to[..read].last() {
+            self.at = self.at.behind(*last);
+        }
         Ok(read)
     }
 }
@@ -64,10 +101,10 @@ impl<R: Read> Rows<R> {
             row: row.clone(),
             text: vec![],
             done: 0,
+            at: PlaceInText::Start,
         };
         let reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
-            .comment(Some(b'#'))
             .delimiter(separator)
             .from_reader(bounded);
         Self {
@@ -76,7 +113,6 @@ impl<R: Read> Rows<R> {
             counted: 0,
             next: 1,
             after_return: false,
-            is_comment: false,
             line: 1,
         }
     }
@@ -111,18 +147,14 @@ impl<R: Read> Rows<R> {
             .text
             .len()
             .min(behind.done + (until - self.counted) as usize);
-        // What was counted before ends with a row.
-        let (mut begin, mut at_start) = (None, true);
+        let mut begin = None;
         for &byte in &behind.text[behind.done..end] {
-            let ends = matches!(byte, b'\r' | b'\n');
-            if byte == b'\r' || byte == b'\n' && !self.after_return {
+            let is_feed = byte == b'\n';
+            if byte == b'\r' || is_feed && !self.after_return {
                 self.next += 1;
-            }
-            self.is_comment = !ends && (self.is_comment || at_start && byte == b'#');
-            if !ends && !self.is_comment && begin.is_none() {
+            } else if !is_feed && byte != 0 && begin.is_none() {
                 begin = Some(self.next);
             }
-            at_start = ends;
             self.after_return = byte == b'\r';
         }
         self.line = begin.unwrap_or(self.line);
@@ -167,6 +199,7 @@ mod tests {
             ("t\n\"1\n\n\"\n2\n\r\n3", &[2, 5, 7]),
             ("# a\nt\n# b\n1\n\n#\r\n# c\n2\n# d", &[4, 8]),
             ("#\r\nt\r\n1\r\n# #\r\n\"2\n#\"\n3", &[3, 5, 7]),
+            ("# it's 5\"\rt\r1\r\r#\r2", &[3, 6]),
         ] {
             // However the bytes come.
             for size in [1, 2, 100] {

@@ -93,7 +93,10 @@ fn short_quotes(text: &str) -> String {
 pub(crate) fn short_words(text: &str) -> String {
     let words = text.split(' ').map(|word| match word.chars().nth(QUOTED) {
         None => Cow::Borrowed(word),
-        Some(_) => Cow::Owned(excerpt(word)),
+        Some(_) => {
+            let name = word.trim_end_matches(|c: char| !c.is_alphanumeric());
+            Cow::Owned(excerpt(name) + &word[name.len()..])
+        }
     });
     words.collect::<Vec<_>>().join(" ")
 }
@@ -162,7 +165,8 @@ fn check_value(value: &toml::Value) -> Result<(), String> {
     }
 }
 
-fn check_name(name: &str) -> Result<(), String> {
+/// Checks whether a text can be shown as a name; else what cannot.
+pub(crate) fn check_name(name: &str) -> Result<(), String> {
     if name.chars().count() > LONGEST {
         let begin = excerpt(name);
         return Err(format!(
@@ -207,8 +211,9 @@ mod tests {
         ));
         assert!(key.ends_with(" …`, expected `a`"), "{key}");
         assert!(key.chars().count() < 2 * QUOTED, "{key}");
-        let name = short_words(&format!("no twin is called {}; name one", "x".repeat(5000)));
-        assert!(name.ends_with("xxx …; name one"), "{name}");
+        let name = "x".repeat(5000);
+        let name = short_words(&format!("no twin is called \"{name}\"; name one"));
+        assert!(name.ends_with("xxx …\"; name one"), "{name}");
     }
 
     #[test]

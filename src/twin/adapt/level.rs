@@ -103,34 +103,32 @@ impl NoiseLevel {
         else {
             return Ok(());
         };
-        let wrong = |value, remedy| TwinError::Value {
+        let wrong = |key: &str, value, remedy| TwinError::Value {
             table: "noise",
-            name: name.into(),
+            name: format!("{name}{key}"),
             value,
             remedy,
         };
         if !(std >= 0.0 && std.is_finite()) {
-            return Err(wrong(std, "a standard deviation is 0 or more"));
+            return Err(wrong("", std, "a standard deviation is 0 or more"));
         }
         if !(0.0..1.0).contains(&share) {
-            return Err(wrong(
-                share,
-                "a share of the signal lies in [0, 1), such as 0.05",
-            ));
+            let remedy = "a share of the signal lies in [0, 1), such as 0.05";
+            return Err(wrong(".share", share, remedy));
         }
         if is_process && share > 0.0 {
             let remedy =
                 "a share is that of an output's noise in its signal; give a state std alone";
-            return Err(wrong(share, remedy));
+            return Err(wrong(".share", share, remedy));
         }
         if !(factor > 1.0 && factor.is_finite()) {
             let remedy = "factor is how many times larger or smaller the level may well be: above 1, such as 2";
-            return Err(wrong(factor, remedy));
+            return Err(wrong(".factor", factor, remedy));
         }
         if known && !is_usual_factor(&factor) {
             let remedy =
                 "a known level is not fitted, and has no factor; remove one of known and factor";
-            return Err(wrong(factor, remedy));
+            return Err(wrong(".factor", factor, remedy));
         }
         Ok(())
     }
@@ -332,8 +330,8 @@ mod tests {
         };
         for (level, value) in [
             (NoiseLevel::declared(-0.1), "-0.1"),
-            (of(0.0, 0.5), "0.5"),
-            (of(-0.2, 2.0), "-0.2"),
+            (of(0.0, 0.5), "h1.factor = 0.5"),
+            (of(-0.2, 2.0), "h1.share = -0.2"),
             (of(0.05, 2.0), "a state"),
         ] {
             let error = level.check("h1", true).unwrap_err().to_string();
