@@ -129,7 +129,7 @@ fn disturbed(seed: u64, rounds: usize, each: usize) {
 
 #[test]
 fn work_is_the_same_whatever_disturbs_it() {
-    disturbed(1, 5, 5);
+    disturbed(1, 3, 3);
 }
 
 #[test]

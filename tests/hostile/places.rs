@@ -128,7 +128,7 @@ fn a_file_that_changes_meanwhile_is_told() {
     let at = place.path();
     for (change, words) in [("echo '# more' >> r.csv", true), ("touch r.csv", false)] {
         let fit =
-            format!("{TRUETWIN} fit r.csv --study short.toml --draws 200000 --out told-{words}");
+            format!("{TRUETWIN} fit r.csv --study short.toml --draws 20000 --out told-{words}");
         let script = format!("(sleep 0.3; {change}) & {fit}");
         let output = Command::new("sh")
             .args(["-c", &script])
