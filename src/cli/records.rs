@@ -53,6 +53,17 @@ pub(super) fn read(
     Ok((records, validation))
 }
 
+/// Refuses a place for a record by a name that its reader would take for another form.
+pub(super) fn check_new(place: &Path) -> Result<(), Failure> {
+    match place.extension().is_some_and(|ending| ending == "parquet") {
+        true => Err(Failure::user(format!(
+            "{}: records are written as CSV; choose a name such as R.csv",
+            place.display()
+        ))),
+        false => output::check_new_file(place),
+    }
+}
+
 /// Warns, once of the same: each of several studies reads the records, and one that is fitted may validate, too.
 fn warn(text: &str) {
     if is_new(text) {

@@ -3,7 +3,7 @@
 use super::table::MOST_SAMPLES;
 use crate::math::three_digits;
 use crate::record::{Drive, Record, RecordError, Signal, UNIFORM};
-use crate::setting::number;
+use crate::setting::{count, number};
 use crate::storage::untrusted::MOST_NUMBERS;
 
 /// Share of a step within which two instants are the same: that of uniform steps.
@@ -112,8 +112,15 @@ pub fn resample(
     }
     let inputs = resampled_inputs(drive, step, samples, rule);
     let drive = Drive::new(step, inputs)?.beginning_at(drive.first_time());
+    let record = match Record::new(drive, all) {
+        Err(RecordError::TooFewValues(rows)) => {
+            let problem = format!("{} with an output", count(rows, "row"));
+            return refused(&problem, "choose a shorter step, or a longer gap to close");
+        }
+        record => record?,
+    };
     Ok(Resampled {
-        record: Record::new(drive, all)?,
+        record,
         interpolated,
         longest_gap,
     })

@@ -24,10 +24,11 @@ pub(crate) fn checksum_of_read(path: &Path) -> Option<String> {
     held(&READ).get(path).cloned()
 }
 
-/// Returns whether a file has other bytes than were read, or is gone. Clocks are not asked.
+/// Returns whether a file has other bytes than were read, or is gone; a pipe may be. Clocks are not asked.
 pub(crate) fn has_changed(path: &Path) -> bool {
     let is_file = path.metadata().map_or(true, |data| data.is_file());
-    is_file && checksum_of_read(path).is_some_and(|read| sha256_of(path).ok() != Some(read))
+    let is_kept = is_file && !held(&PIPES).contains_key(path);
+    is_kept && checksum_of_read(path).is_some_and(|read| sha256_of(path).ok() != Some(read))
 }
 
 /// Opens a file for reading, or what a pipe has given; says so where a link leads nowhere, and where the bytes of a pipe are gone.

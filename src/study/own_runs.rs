@@ -32,7 +32,7 @@ impl Study {
         })
     }
 
-    /// Compares one run; the error says where it differs first, and where most.
+    /// Compares one run; the error says where each output differs first, and where most.
     fn same_run(&self, theta: &[f64], drive: &Drive) -> Result<(), String> {
         let Some(own) = &self.own_runs else {
             return Ok(());
@@ -49,6 +49,7 @@ impl Study {
         };
         let equations = run(twin.free_run(theta, drive), "the equations")?;
         let own_run = run(own.simulate(theta, drive, Noise::OFF), "the program's run")?;
+        let mut wrong = vec![];
         for (j, output) in own.signals().outputs.iter().enumerate() {
             let (one, other) = (own_run.column(j), equations.column(j));
             let scale = deviation(&other.to_vec());
@@ -71,13 +72,16 @@ impl Study {
             let name = &output.name;
             let most = most.filter(|k| *k != first);
             let most = most.map_or(String::new(), |k| format!("; most {}", place(k)));
-            return Err(format!(
-                "{name} differs from {} s on: {}{most} ({at}); change one of them",
+            wrong.push(format!(
+                "{name} differs from {} s on: {}{most}",
                 number(drive.time(first)),
                 place(first)
             ));
         }
-        Ok(())
+        match wrong.is_empty() {
+            true => Ok(()),
+            false => Err(format!("{} ({at}); change one of them", wrong.join("; "))),
+        }
     }
 }
 
@@ -118,5 +122,26 @@ mod tests {
         for part in ["y differs from", "simulate answers", "k1 = 0.6"] {
             assert!(other.message.contains(part), "{}", other.message);
         }
+    }
+
+    #[test]
+    fn each_output_that_differs_is_told() {
+        let text = |y: &str, z: &str| {
+            format!(
+                "[twin]\nname = 'two'\n[parameters]\nk = {{ prior = [0.4, 0.8] }}\n[states]\nh = {{ rate = '-k*h', start = 1 }}\n\
+                 [outputs]\ny = {{ value = '{y}' }}\nz = {{ value = '{z}' }}\n"
+            )
+        };
+        let file = |text: String| StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+        let study = Study::of_file(&file(text("h", "h"))).unwrap();
+        let own = file(text("1.1*h", "1.2*h"));
+        let own = Arc::new(own.own_equations().unwrap().clone());
+        let found = study.with_own_runs(own);
+        let found = found.check_own_runs(&Drive::autonomous(0.5, 20).unwrap(), 1);
+        let message = found.unwrap().message;
+        assert!(
+            message.contains("y differs") && message.contains("; z differs"),
+            "{message}"
+        );
     }
 }

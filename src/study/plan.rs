@@ -233,7 +233,7 @@ impl RecordPlan {
         let (step, samples) = (drive.dt(), drive.samples());
         if (step - self.step).abs() > UNIFORM * self.step || samples != self.samples {
             return Err(StudyError::Plan(format!(
-                "{}: {}, step {} s; simulated records have {}, step {} s: resample the file, or plan records of its step and length",
+                "{}: {}, step {} s; simulated records have {}, step {} s: write the file so, or plan records of its step and length",
                 path.display(),
                 count(samples, "sample"),
                 number(step),
@@ -275,7 +275,7 @@ fn check_one_step(path: &Path, drive: &Drive) -> Result<(), StudyError> {
     match drive.is_uniform() {
         true => Ok(()),
         false => Err(StudyError::Plan(format!(
-            "{}, column t: the steps vary; simulated records need one step: resample the inputs",
+            "{}, column t: the steps vary; simulated records need one step: write the inputs with one",
             path.display()
         ))),
     }
@@ -305,7 +305,7 @@ pub(super) fn grid_of_files(
         let (first, other, length) = *grid.get_or_insert((path, step, samples));
         if (step - other).abs() > UNIFORM * other || samples != length {
             return Err(StudyError::Plan(format!(
-                "{}: {}, step {} s, and {} has {length}, step {} s; inputs of one record have one step and length: resample or cut one",
+                "{}: {}, step {} s, and {} has {length}, step {} s; inputs of one record have one step and length: write them alike",
                 path.display(),
                 count(samples, "sample"),
                 number(step),

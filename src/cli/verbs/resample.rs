@@ -45,7 +45,7 @@ enum Inputs {
 
 impl Verb for Resample {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        output::check_new_file(&self.out)?;
+        records::check_new(&self.out)?;
         let (record, names) = self.columns.reader_without_twin().named(&self.record)?;
         let rule = match self.inputs {
             Inputs::Mean => InputRule::Mean,

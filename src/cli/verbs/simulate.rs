@@ -38,7 +38,7 @@ pub(in crate::cli) struct Simulate {
 impl Verb for Simulate {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         if let Some(out) = &self.out {
-            output::check_new_file(out)?;
+            records::check_new(out)?;
         }
         self.columns
             .check_used(self.input.is_some(), "--input U.csv")?;

@@ -175,8 +175,13 @@ impl Inside {
     }
 }
 
-/// Checks that a record's inputs are no files, which a program has no folder for.
+/// Checks that a record has nothing of files: a program has no folder for them, and does not know how those of a user name their columns.
 pub(super) fn check_files(record: &RecordTable) -> Result<(), String> {
+    if !record.columns.is_empty() {
+        return Err(
+            "record: columns are those of a user's files; leave them to a study file".into(),
+        );
+    }
     let files = (record.input.iter()).flat_map(|input| input.files());
     match files.into_iter().next() {
         None => Ok(()),
@@ -426,6 +431,11 @@ mod tests {
             ),
             ("\"euler\"", "\"eulre\"", "unknown integrator"),
             ("60", "0", "record: samples: samples = 0"),
+            (
+                "\"euler\"",
+                "\"euler\", \"columns\": {\"t\": \"time\"}",
+                "record: columns are those of a user's files",
+            ),
             ("0.05", "-1", "record: step: step = -1 s"),
             (
                 "\"euler\"",

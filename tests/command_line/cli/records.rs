@@ -214,6 +214,15 @@ fn gaps_and_varying_steps_are_resampled() {
         &[&call[..], &["-1", "--out", &none]].concat(),
         &["gaps.csv: a longest gap of -1 s; choose a positive number"],
     );
+    let parquet = place.at("none.parquet");
+    let few = place.write("few.csv", "t,u,y\n0,1,\n1,2,2\n2,1,3\n3,2,4\n4,1,5\n5,2,\n");
+    let coarse = ["resample", &few, "--step", "4.5", "--out"];
+    let parts = ["few.csv: a step of 4.5 s leaves 0 rows with an output of a record of 5 s"];
+    refused(&[&coarse[..], &[&none]].concat(), &parts);
+    refused(
+        &[&coarse[..], &[&parquet]].concat(),
+        &["none.parquet: records are written as CSV"],
+    );
     let out = place.at("coarse.csv");
     let call = [
         "resample", &gaps, "--step", "1", "--inputs", "hold", "--out", &out, "--json",
