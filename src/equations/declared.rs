@@ -5,6 +5,7 @@ use super::error::EquationsError;
 use super::graph::{Id, Varies};
 use super::names::Scope;
 use crate::setting::number;
+use crate::twin::KNOWN_WITH_FACTOR;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::de::{DeTable, DeValue};
 
@@ -85,8 +86,7 @@ impl Declared {
         if let Some(value) = keys.get("factor") {
             match super::place::number(value.get_ref()) {
                 Some(_) if self.known.contains(entry.name) => {
-                    let problem = "a known level is not fitted, and has no factor; remove one of known and factor";
-                    return table.error(problem);
+                    return table.error(KNOWN_WITH_FACTOR);
                 }
                 Some(factor) if factor > 1.0 && factor.is_finite() => {
                     self.factors.insert(entry.name.into(), factor);

@@ -8,11 +8,10 @@ use super::channels::{columns, header};
 use super::columns::{Columns, Wanted};
 use super::parquet;
 use super::table::Table;
-use super::text::Text;
+use super::text::{Text, cell};
 use crate::record::{Drive, Record, RecordError, Signal, Signals};
 use crate::storage::files::write_new;
 use crate::storage::reading::Reading;
-use std::borrow::Cow;
 use std::path::Path;
 
 impl Record {
@@ -174,14 +173,6 @@ fn csv_text(header: &[String], drive: &Drive, outputs: &Signal) -> String {
         text.push('\n');
     }
     text
-}
-
-/// A name as a cell.
-fn cell(name: &str) -> Cow<'_, str> {
-    match name.contains([',', ';', '\t', '"']) {
-        true => format!("\"{}\"", name.replace('"', "\"\"")).into(),
-        false => name.into(),
-    }
 }
 
 impl Record {

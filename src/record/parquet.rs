@@ -1,5 +1,7 @@
 //! Records in Parquet files: the same columns as in CSV, so the same rules and messages; a header stands for row 1. Times are time stamps.
 
+#[cfg(feature = "parquet")]
+use super::text::cell;
 use crate::record::RecordError;
 use std::io::Read;
 use std::path::Path;
@@ -39,7 +41,8 @@ pub(super) fn with_rows<T>(
     for column in schema.columns() {
         let name = &column.path().parts()[0];
         // One that holds lists or tables has a part for each of their entries; a row has one cell.
-        if column.path().parts().len() > 1 && names.last() == Some(&quoted(name)) {
+        let own = cell(name);
+        if column.path().parts().len() > 1 && names.last() == Some(&own) {
             continue;
         }
         let unit = match durations.get(name) {
@@ -49,7 +52,7 @@ pub(super) fn with_rows<T>(
         let wrong =
             |problem| RecordError::file(path, format!("column {} {problem}", excerpt(name)));
         units.push(unit.map_err(wrong)?);
-        names.push(quoted(name));
+        names.push(own);
     }
     let header = names.join(",") + "\n";
     let rows = reader.get_row_iter(None).map_err(wrong)?;
@@ -104,17 +107,11 @@ where
     }
 }
 
-/// A cell of CSV with any text.
-#[cfg(feature = "parquet")]
-fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('"', "\"\""))
-}
-
 #[cfg(feature = "parquet")]
 fn line(row: &parquet::record::Row, units: &[Option<times::Unit>]) -> String {
     use parquet::record::Field;
 
-    let cell = |((_, field), unit): ((&String, &Field), &Option<times::Unit>)| {
+    let written = |((_, field), unit): ((&String, &Field), &Option<times::Unit>)| {
         let time = unit.and_then(|unit| unit.cell(field));
         time.unwrap_or_else(|| match field {
             // With an exponent where it is very large or small.
@@ -122,11 +119,11 @@ fn line(row: &parquet::record::Row, units: &[Option<times::Unit>]) -> String {
             Field::Float(value) => format!("{:?}", f64::from(*value)),
             Field::Null => String::new(),
             // Anything else that is no number is named by the checks of a cell.
-            Field::Str(text) => quoted(text),
-            other => quoted(&other.to_string()),
+            Field::Str(text) => cell(text).into_owned(),
+            other => cell(&other.to_string()).into_owned(),
         })
     };
-    let cells: Vec<String> = row.get_column_iter().zip(units).map(cell).collect();
+    let cells: Vec<String> = row.get_column_iter().zip(units).map(written).collect();
     cells.join(",") + "\n"
 }
 

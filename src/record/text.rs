@@ -2,6 +2,7 @@
 
 use crate::storage::untrusted::quoted;
 use encoding_rs_io::DecodeReaderBytesBuilder;
+use std::borrow::Cow;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 
 /// Longest beginning that is looked at to find the header, in bytes: two thousand names of thirty letters.
@@ -28,18 +29,21 @@ impl<'a> Text<'a> {
             .build(file);
         let mut reader = BufReader::new(decoder);
         let mut start = Vec::new();
-        while header(&start).is_empty() {
-            let left = MOST_START.saturating_sub(start.len() as u64);
+        let mut line = 0..0;
+        while header(&start[line.clone()]).is_empty() {
+            let before = start.len();
+            let left = MOST_START.saturating_sub(before as u64);
             if reader.by_ref().take(left).read_until(b'\n', &mut start)? == 0 {
                 break;
             }
+            line = before..start.len();
         }
         if start.contains(&0) {
             let remedy = "save it as UTF-8 text, or as UTF-16 with a byte-order mark";
             return Ok(Err(format!("the file is UTF-16 or binary; {remedy}")));
         }
         Ok(Ok(Self {
-            separator: separator(header(&start)),
+            separator: separator(header(&start[line])),
             text: Box::new(Cursor::new(start).chain(reader)),
         }))
     }
@@ -50,6 +54,14 @@ impl<'a> Text<'a> {
             text: Box::new(text),
             separator: b',',
         }
+    }
+}
+
+/// A text as a cell of a file with commas.
+pub(super) fn cell(text: &str) -> Cow<'_, str> {
+    match text.starts_with('#') || text.contains([',', ';', '\t', '"', '\r', '\n']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")).into(),
+        false => text.into(),
     }
 }
 

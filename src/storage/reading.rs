@@ -44,11 +44,8 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
         file.seek(SeekFrom::Start(0))?;
         return Ok(file);
     }
-    File::open(path).map_err(|error| match dangling(path) {
-        Some(to) => {
-            let text = format!("it is a link to {}, which does not exist", to.display());
-            io::Error::new(error.kind(), text)
-        }
+    File::open(path).map_err(|error| match link_to_nothing(path) {
+        Some(text) => io::Error::new(error.kind(), text),
         None => error,
     })
 }
@@ -69,11 +66,20 @@ pub(crate) fn is_pipe(path: &Path) -> bool {
 }
 
 /// Returns where a link leads, if nothing is there.
-pub(crate) fn dangling(path: &Path) -> Option<PathBuf> {
+pub(super) fn dangling(path: &Path) -> Option<PathBuf> {
     match path.metadata() {
         Err(error) if error.kind() == io::ErrorKind::NotFound => path.read_link().ok(),
         _ => None,
     }
+}
+
+/// Returns what is wrong with a link that leads nowhere.
+pub(crate) fn link_to_nothing(path: &Path) -> Option<String> {
+    let to = dangling(path)?;
+    Some(format!(
+        "it is a link to {}, which does not exist",
+        to.display()
+    ))
 }
 
 /// A file that is read once, from begin to end.

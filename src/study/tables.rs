@@ -89,10 +89,9 @@ impl Library {
 
     /// Returns whether all of these effects that `only` names stand in `without`, too.
     pub fn contradicts_itself(&self, effects: &[Effect]) -> bool {
-        let mut only = (effects.iter().map(Effect::key)).filter(|key| named(&self.only, key));
-        let first = only.next();
-        first.is_some_and(|key| named(&self.without, key))
-            && only.all(|key| named(&self.without, key))
+        let only = (effects.iter().map(Effect::key)).filter(|key| named(&self.only, key));
+        let mut only = only.peekable();
+        only.peek().is_some() && only.all(|key| named(&self.without, key))
     }
 }
 

@@ -26,7 +26,9 @@ mod parameter;
 mod points;
 mod state_space;
 
-pub(crate) use adapt::{Adaptation, DeclaredNoise, NoiseLevel, StartLevel, adapt, begun, fix};
+pub(crate) use adapt::{
+    Adaptation, DeclaredNoise, KNOWN_WITH_FACTOR, NoiseLevel, StartLevel, adapt, begun, fix,
+};
 pub(crate) use blocks::Blocks;
 pub(crate) use composed::{
     Acting, DeadTime, Disturbance, Entry, FittedLevels, Follows, KnownNoise, LARGEST, Law, LawPart,

@@ -1,13 +1,12 @@
 //! Disks that are full, folders that cannot be written, processes that meet: one line that says so, nothing lost, and the same call
 //! goes on once there is room. On small file systems of our own, in a name space of our own.
 
+use crate::calls::{TRUETWIN, run};
 use crate::files::files;
 use crate::studies::short;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
-
-const TRUETWIN: &str = env!("CARGO_BIN_EXE_truetwin");
 
 /// Runs a script as a root who has nothing but mounts of its own; `None` where the system does not let us.
 pub(crate) fn in_name_space(folder: &Path, script: &str) -> Option<Output> {
@@ -28,14 +27,6 @@ pub(crate) fn in_name_space(folder: &Path, script: &str) -> Option<Output> {
     );
     eprintln!("skipped: no mounts of our own here");
     None
-}
-
-fn run(folder: &Path, words: &str) -> Output {
-    Command::new(TRUETWIN)
-        .args(words.split_whitespace())
-        .current_dir(folder)
-        .output()
-        .unwrap()
 }
 
 /// One line of an error that says all of this.

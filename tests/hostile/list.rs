@@ -1,5 +1,6 @@
 //! Hostile calls that once failed: each ends in one line that names the problem, the place and the remedy.
 
+use crate::calls::{TRUETWIN, run};
 use crate::files::files;
 use crate::studies::short;
 use std::fs;
@@ -9,13 +10,6 @@ use tempfile::TempDir;
 
 /// Name of a file that a killed process has left.
 const LEFTOVER: &str = ".truetwin-unfinished-4711-a1B2c3";
-const TRUETWIN: &str = env!("CARGO_BIN_EXE_truetwin");
-
-fn run(folder: &Path, words: &str) -> Output {
-    let mut command = Command::new(TRUETWIN);
-    command.args(words.split_whitespace()).current_dir(folder);
-    command.output().unwrap()
-}
 
 /// Runs a call that fails with code 2 and one line with all of these parts.
 fn refused(folder: &Path, words: &str, parts: &[&str]) {

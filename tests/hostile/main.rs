@@ -1,6 +1,7 @@
 //! Hostile files and places: readers, limits, full disks, signals, security. Every allocation of this binary is counted.
 
 mod allocations;
+mod calls;
 #[cfg(target_os = "linux")]
 mod faults;
 #[path = "../common/files.rs"]

@@ -1,6 +1,7 @@
 //! Kills, signals, full disks and manifests of another version, mixed at random: the same call ends the work, with the content of one that
 //! was never disturbed. On a small file system of our own, in a name space of our own.
 
+use crate::calls::run;
 use crate::faults::in_name_space;
 use crate::files::files;
 use crate::studies::short;
@@ -11,7 +12,6 @@ use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 /// A call that keeps its work, and what the disturbed one has in common with another.
 struct Work {
@@ -100,11 +100,7 @@ fn disturbed(seed: u64, rounds: usize, each: usize) {
     for work in &ALL {
         let verb = work.call.split(' ').next().unwrap();
         let words = format!("{} --out {verb}-whole", work.call);
-        let whole = Command::new(env!("CARGO_BIN_EXE_truetwin"))
-            .args(words.split(' '))
-            .current_dir(at)
-            .output();
-        assert!(whole.unwrap().status.success(), "{verb}");
+        assert!(run(at, &words).status.success(), "{verb}");
         for session in 0..rounds / each {
             let mut script = String::from("mkdir -p disk; mount -t tmpfs -o size=100m none disk\n");
             for _ in 0..each {

@@ -1,5 +1,6 @@
 //! Numbers of users and of their programs that computations cannot take: no call ends by a fault of the program.
 
+use crate::calls::told;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -7,10 +8,6 @@ use std::process::{Command, Output};
 fn run(folder: &Path, words: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_truetwin"));
     command.args(words).current_dir(folder).output().unwrap()
-}
-
-fn told(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Noise that is declared far below what a record with a stop can tell: the range of the fitted level keeps its ends in order.

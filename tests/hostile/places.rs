@@ -1,6 +1,7 @@
 //! Names and places that a system allows: bytes that are no text, pipes, links to nothing, a user's own dotfiles, places that are taken
 //! while the work goes on. No answer is lost to them.
 
+use crate::calls::{TRUETWIN, run, told};
 use crate::studies::short;
 use std::ffi::{OsStr, OsString};
 use std::fs;
@@ -9,16 +10,10 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-const TRUETWIN: &str = env!("CARGO_BIN_EXE_truetwin");
-
 fn call<'a>(folder: &Path, words: &str, more: impl IntoIterator<Item = &'a OsStr>) -> Output {
     let mut command = Command::new(TRUETWIN);
     command.args(words.split_whitespace()).args(more);
     command.current_dir(folder).output().unwrap()
-}
-
-fn run(folder: &Path, words: &str) -> Output {
-    call(folder, words, [])
 }
 
 /// A folder with a short record of the oscillator and its study.
@@ -31,10 +26,6 @@ fn with_record() -> tempfile::TempDir {
     );
     assert!(made.status.success(), "{made:?}");
     place
-}
-
-fn told(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn json(output: &Output) -> serde_json::Value {

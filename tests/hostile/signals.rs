@@ -1,6 +1,7 @@
 //! SIGINT and SIGTERM at random times in every verb that works for a while: it ends within two seconds with exit code 130, and what it says
 //! of what is kept is true.
 
+use crate::calls::{self, run, start, told};
 use crate::studies::short;
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
@@ -9,10 +10,9 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 use std::time::{Duration, Instant};
 
-const TRUETWIN: &str = env!("CARGO_BIN_EXE_truetwin");
 /// Two seconds are documented; the rest is for a loaded machine.
 const HEARD: Duration = Duration::from_secs(2 + 2);
 
@@ -43,12 +43,6 @@ const CALLS: [(&str, &str); 12] = [
         "c",
     ),
 ];
-
-fn run(at: &Path, words: &str) -> Output {
-    let mut command = Command::new(TRUETWIN);
-    command.args(words.split(' ')).current_dir(at);
-    command.output().unwrap()
-}
 
 fn prepare(at: &Path, copies: usize) {
     short(at);
@@ -93,10 +87,7 @@ fn remove(at: &Path, out: &str) {
 
 /// Time that a call takes, cut off at `most`.
 fn time_of(at: &Path, call: &str, most: Duration) -> Duration {
-    let mut command = Command::new(TRUETWIN);
-    command.args(call.split(' ')).current_dir(at);
-    command.stdout(Stdio::null()).stderr(Stdio::null());
-    let (clock, mut child) = (Instant::now(), command.spawn().unwrap());
+    let (clock, mut child) = (Instant::now(), start(at, call));
     while clock.elapsed() < most && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -108,16 +99,12 @@ fn time_of(at: &Path, call: &str, most: Duration) -> Duration {
 
 /// Starts a call, sends a signal after a time, and returns how long it took to end; `None` if it ended before.
 fn stopped(at: &Path, call: &str, signal: &str, after: Duration) -> Option<(Duration, Output)> {
-    let mut command = Command::new(TRUETWIN);
-    command.args(call.split(' ')).current_dir(at);
-    command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn().unwrap();
+    let mut child = start(at, call);
     std::thread::sleep(after);
     if child.try_wait().unwrap().is_some() {
         return None;
     }
-    let id = child.id().to_string();
-    Command::new("kill").args([signal, &id]).status().unwrap();
+    calls::signal(&child, signal);
     let clock = Instant::now();
     let output = child.wait_with_output().unwrap();
     Some((clock.elapsed(), output))
@@ -131,7 +118,7 @@ fn wrong(
     took: Duration,
     end: &Output,
 ) -> Vec<String> {
-    let said = String::from_utf8_lossy(&end.stderr).into_owned();
+    let said = told(end);
     let is_new = |name: &&String| !before.contains(*name);
     let after = names(at);
     let new: Vec<&String> = after.iter().filter(is_new).collect();

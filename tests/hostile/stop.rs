@@ -1,23 +1,14 @@
 //! Ctrl-C: a clean end, the call that goes on; `kill -9` at any moment: the same call goes on all the same. Then the bytes are those
 //! of an undisturbed run.
 
+use crate::calls::{self, start};
 use crate::files::files;
 use crate::studies::short;
 use crate::timeless::timeless;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
-
-fn start(folder: &Path, arguments: &str) -> std::process::Child {
-    Command::new(env!("CARGO_BIN_EXE_truetwin"))
-        .current_dir(folder)
-        .args(arguments.split_whitespace())
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
-}
 
 fn entries(folder: &Path) -> usize {
     fs::read_dir(folder).map_or(0, |folder| folder.count())
@@ -40,14 +31,7 @@ fn interrupted(folder: &Path, arguments: &str, signal: &str, ready: impl Fn() ->
     while !ready() && since.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(2));
     }
-    let pid = child.id().to_string();
-    assert!(
-        Command::new("kill")
-            .args([signal, &pid])
-            .status()
-            .unwrap()
-            .success()
-    );
+    calls::signal(&child, signal);
     let output = child.wait_with_output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{said}");

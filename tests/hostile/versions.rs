@@ -1,8 +1,9 @@
 //! Files of an earlier version, kept in `fixtures`: each is read, or refused in one line with the remedy.
 
+use crate::calls::{run, told};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 use tempfile::TempDir;
 
 /// Copies a folder with all that is in it.
@@ -23,16 +24,6 @@ fn place() -> TempDir {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile/fixtures/8961e62");
     copy(&fixtures, place.path());
     place
-}
-
-fn run(folder: &Path, words: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_truetwin"));
-    command.args(words.split_whitespace()).current_dir(folder);
-    command.output().unwrap()
-}
-
-fn told(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn succeeds(folder: &Path, words: &str) -> Output {

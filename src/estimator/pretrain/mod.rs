@@ -11,7 +11,7 @@ use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::network::{Checkpoints, History, NetworkError, Samples};
 use crate::progress::Progress;
 use crate::storage::files::write_result;
-use crate::storage::reading::dangling;
+use crate::storage::reading::link_to_nothing;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use crate::storage::{StorageError, sweep_beside};
 use ndarray::Array2;
@@ -263,11 +263,8 @@ impl Pretraining {
         let place = Self::work_folder(path);
         sweep_beside(path);
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
-            let problem = match dangling(path) {
-                Some(to) => format!(
-                    "it is a link to {}, which does not exist; remove it",
-                    to.display()
-                ),
+            let problem = match link_to_nothing(path) {
+                Some(problem) => format!("{problem}; remove it"),
                 None => "exists already; choose another name, or remove it".into(),
             };
             return Err(EstimatorError::file(path, problem));

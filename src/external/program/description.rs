@@ -1,7 +1,7 @@
 //! Description that a program gives of itself.
 
 use super::super::name;
-use super::inside::{Inside, check_files};
+use super::inside::{Inside, check_record};
 use super::once_each::OnceEach;
 use crate::record::{Quantity, Signals};
 use crate::setting::number;
@@ -176,7 +176,7 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
             number(step)
         ));
     }
-    check_files(table)?;
+    check_record(table)?;
     if table.hold.is_some() || table.integrator.is_some() || table.substeps.is_some() {
         return Err(
             "record: hold, integrator and substeps need the twin's equations, which this program does not show; leave them out"

@@ -163,7 +163,7 @@ impl Inside {
             other => message(&other.to_string()),
         };
         let file = StudyFile::parse(&writer.text, Path::new("the description")).map_err(wrong)?;
-        check_files(&file.record)?;
+        check_record(&file.record)?;
         Study::of_file(&file).map_err(wrong)?;
         Ok(Self {
             name: name.into(),
@@ -176,7 +176,7 @@ impl Inside {
 }
 
 /// Checks that a record has nothing of files: a program has no folder for them, and does not know how those of a user name their columns.
-pub(super) fn check_files(record: &RecordTable) -> Result<(), String> {
+pub(super) fn check_record(record: &RecordTable) -> Result<(), String> {
     if !record.columns.is_empty() {
         return Err(
             "record: columns are those of a user's files; leave them to a study file".into(),

@@ -5,7 +5,7 @@ use super::piece;
 use crate::storage::files::{replace, write_new};
 use crate::storage::names::is_unfinished;
 use crate::storage::place::check_place;
-use crate::storage::reading::{checksum_of_read, dangling};
+use crate::storage::reading::{checksum_of_read, link_to_nothing};
 use crate::storage::unfinished;
 use crate::storage::untrusted::{check_file, check_folder, message, read_kept_text};
 use crate::storage::{NewFolder, StorageError, sweep_beside};
@@ -265,12 +265,7 @@ pub(crate) fn has_pieces(folder: &Path) -> bool {
 fn read_manifest(path: &Path, verb: &'static str) -> Result<Manifest, String> {
     match path.symlink_metadata() {
         _ if path.is_dir() => {}
-        Ok(_) => {
-            return Err(match dangling(path) {
-                Some(to) => format!("it is a link to {}, which does not exist", to.display()),
-                None => "it is no folder".into(),
-            });
-        }
+        Ok(_) => return Err(link_to_nothing(path).unwrap_or_else(|| "it is no folder".into())),
         Err(_) => return Err("it does not exist".into()),
     }
     let text = read_kept_text(&path.join(MANIFEST), MOST).map_err(|error| match error.kind() {

@@ -3,6 +3,10 @@
 use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
 
+/// Refusal of a factor that nothing could take.
+pub(crate) const KNOWN_WITH_FACTOR: &str =
+    "a known level is not fitted, and has no factor; remove one of known and factor";
+
 /// A noise level: `0.1`, `{ std = 0.1, known = true }`, or `"estimate"`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "NoiseText", into = "NoiseText")]
@@ -126,9 +130,7 @@ impl NoiseLevel {
             return Err(wrong(".factor", factor, remedy));
         }
         if known && !is_usual_factor(&factor) {
-            let remedy =
-                "a known level is not fitted, and has no factor; remove one of known and factor";
-            return Err(wrong(".factor", factor, remedy));
+            return Err(wrong(".factor", factor, KNOWN_WITH_FACTOR));
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 mod level;
 
-pub(crate) use level::{DeclaredNoise, NoiseLevel, Per, StartLevel};
+pub(crate) use level::{DeclaredNoise, KNOWN_WITH_FACTOR, NoiseLevel, Per, StartLevel};
 
 use super::composed::LevelValue;
 use crate::record::Quantity;

@@ -110,14 +110,6 @@ impl Event {
         matches!(self.trigger, Trigger::Times(_))
     }
 
-    /// Returns whether its condition or one of its times is not a number.
-    pub(super) fn is_undefined(&self, now: &Now<'_>, x: &[f64]) -> bool {
-        match &self.trigger {
-            Trigger::Margin(margin) => margin(now, x).is_nan(),
-            Trigger::Times(times) => times(now).into_iter().any(f64::is_nan),
-        }
-    }
-
     /// Returns its times; none of one of a condition.
     pub(super) fn times(&self, now: &Now<'_>) -> Vec<f64> {
         match &self.trigger {

@@ -54,14 +54,15 @@ impl Workspace {
             between: now.between.filter(|_| !is_discrete),
             ..*now
         };
-        if let Some(event) = calls.undefined(&way, &x[..n]) {
-            let (name, at) = (event.name(), number(way.t));
-            let remedy = "give it one there, or leave these parameters out of the prior";
-            self.events.fault = Some(format!("{name} has no number at t = {at} s; {remedy}"));
-            x.fill(f64::NAN);
-            return;
-        }
-        let times = calls.times(&way, &x[..n], rule);
+        let times = match calls.times(&way, &x[..n], rule) {
+            Ok(times) => times,
+            Err(event) => {
+                let (name, at) = (event.name(), number(way.t));
+                let remedy = "give it one there, or leave these parameters out of the prior";
+                self.events.fault = Some(format!("{name} has no number at t = {at} s; {remedy}"));
+                return x.fill(f64::NAN);
+            }
+        };
         let events = EventsOfWay {
             calls,
             times: &times,

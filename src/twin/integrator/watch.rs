@@ -47,16 +47,6 @@ impl EventCalls<'_> {
         margins
     }
 
-    /// Returns the event that cannot be told at this point of numbers.
-    pub fn undefined(&self, now: &Now<'_>, x: &[f64]) -> Option<&Event> {
-        let mut found = None;
-        (self.inside)(now, x, &mut |own| {
-            let is_undefined = |event: &&Event| event.is_undefined(own, &x[..self.states]);
-            found = self.list.iter().find(is_undefined);
-        });
-        found.filter(|_| x.iter().all(|x| x.is_finite()))
-    }
-
     fn change(&self, event: usize, now: &Now<'_>, x: &mut [f64]) {
         let seen = x.to_vec();
         (self.inside)(now, &seen, &mut |own| {
@@ -65,11 +55,25 @@ impl EventCalls<'_> {
     }
 
     /// Returns the shares of the way at which there are events, each with the event, in order; in discrete time they are at its ends.
-    pub fn times(&self, now: &Now<'_>, x: &[f64], rule: Integrator) -> Vec<(f64, usize)> {
-        let mut all = vec![];
+    ///
+    /// # Errors
+    ///
+    /// The event whose condition or time is not a number at this point of numbers.
+    pub fn times(
+        &self,
+        now: &Now<'_>,
+        x: &[f64],
+        rule: Integrator,
+    ) -> Result<Vec<(f64, usize)>, &Event> {
+        let (mut all, mut undefined) = (vec![], None);
         (self.inside)(now, x, &mut |own| {
             for (i, event) in self.list.iter().enumerate() {
-                for at in event.times(own) {
+                let times = event.times(own);
+                let margin = event.margin(own, &x[..self.states]);
+                if margin.is_nan() || times.iter().any(|at| at.is_nan()) {
+                    undefined.get_or_insert(event);
+                }
+                for at in times {
                     let share = (at - own.t) / now.dt;
                     // A clock of days has a share of a step in its last digits.
                     let same = SAME.max(4.0 * f64::EPSILON * own.t.abs() / now.dt);
@@ -85,7 +89,10 @@ impl EventCalls<'_> {
             }
         });
         ascending(&mut all, |a| a.0);
-        all
+        match undefined.filter(|_| x.iter().all(|x| x.is_finite())) {
+            Some(event) => Err(event),
+            None => Ok(all),
+        }
     }
 }
 
