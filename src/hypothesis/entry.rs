@@ -51,7 +51,13 @@ impl Placed {
         } = self.function;
         let value = of.value(now.t, x, now.u, signal);
         let variable = match trace {
-            Some(trace) => trace.step(x[self.memory], value, now.dt),
+            Some(trace) => {
+                let dt = match of {
+                    Of::Input(_) => now.dt,
+                    _ => now.since,
+                };
+                trace.step(x[self.memory], value, dt)
+            }
             None => value,
         };
         sum_of_one(m, variable, ends)

@@ -229,6 +229,23 @@ impl Drive {
         }
     }
 
+    /// Time in seconds from the row before to row k, from the last one of an earlier time where they are replicates; Δt at the first time.
+    #[inline]
+    pub(crate) fn since(&self, k: usize) -> f64 {
+        let Some(times) = &self.times else {
+            return self.dt;
+        };
+        let earlier = match k {
+            0 => 0,
+            k if times[k - 1] < times[k] => k,
+            k => times[..k].partition_point(|t| *t < times[k]),
+        };
+        match earlier {
+            0 => self.dt,
+            earlier => times[k] - times[earlier - 1],
+        }
+    }
+
     /// Returns whether the next row is another reading of the state of row k.
     #[inline]
     pub(crate) fn is_repeated(&self, k: usize) -> bool {

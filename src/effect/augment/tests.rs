@@ -48,6 +48,43 @@ fn a_late_twin_is_a_twin_with_a_late_sensor() {
     }
 }
 
+/// What a sensor remembers moves over the time since the row before, however the steps vary; replicates read one state.
+#[test]
+fn a_slow_sensor_counts_the_time_since_the_row_before() {
+    let times = [0.0, 0.5, 2.0, 2.0, 2.0, 2.3, 5.0, 5.1, 9.0];
+    let input = |t: f64| if t < 2.0 { 1.0 } else { 2.0 };
+    let u = Signal::from_shape_fn((times.len(), 1), |(k, _)| input(times[k]));
+    let drive = Drive::with_times(&times, u).unwrap();
+    let base = Twin::new(CascadedTanks);
+    let theta = [0.6, 0.5, 0.55, 1.0];
+    let plain = base.free_run(&theta, &drive).unwrap();
+    let seen = |id: &str, m: &[f64]| {
+        let effect = Catalogue::default().effect(id, "sensor").unwrap();
+        let twin = augment(base.clone(), vec![effect]).unwrap();
+        twin.free_run(&[&theta[..], m].concat(), &drive).unwrap()
+    };
+    let (tau, frequency, damping) = (1.5, 0.2, 0.3);
+    let (lagged, ringing) = (
+        seen("sensor-lag", &[tau]),
+        seen("sensor-mode", &[frequency, damping]),
+    );
+    // Both laws as differential equations, their signal held over the time since the row before.
+    let omega = std::f64::consts::TAU * frequency;
+    let (mut lag, mut mode, mut speed) = (plain[[0, 0]], plain[[0, 0]], 0.0);
+    for (k, s) in plain.column(0).iter().enumerate() {
+        let since = if k == 0 { 0.0 } else { times[k] - times[k - 1] };
+        let parts = 20_000;
+        let h = since / f64::from(parts);
+        for _ in 0..parts {
+            lag += h * (s - lag) / tau;
+            speed += h * (omega * omega * (s - mode) - 2.0 * damping * omega * speed);
+            mode += h * speed;
+        }
+        assert!((lagged[[k, 0]] - lag).abs() < 1e-3, "row {k}");
+        assert!((ringing[[k, 0]] - mode).abs() < 1e-3, "row {k}");
+    }
+}
+
 /// Actuators remember nothing in the state: a delay there is the twin with its inputs later, the first one held before.
 #[test]
 fn a_delayed_input_costs_no_state() {

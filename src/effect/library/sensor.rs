@@ -60,7 +60,7 @@ fn dynamics() -> Vec<EffectKind> {
         EffectKind::sensor(
             "sensor-lag",
             "z ← a·z + (1 − a)·s, a = exp(−Δt/τ)",
-            |m, now, memory, s| lag(m[0], now.dt, &mut memory[0], s),
+            |m, now, memory, s| lag(m[0], now.since, &mut memory[0], s),
         )
         .with_sentence("{place} follows the true value with a lag of {tau}.")
         .magnitude(TAU)
@@ -70,7 +70,7 @@ fn dynamics() -> Vec<EffectKind> {
         EffectKind::sensor(
             "sensor-mode",
             "z̈ + 2·damping·ω·ż + ω²·z = ω²·s, ω = 2π·frequency",
-            |m, now, memory, s| ring(m, now.dt, memory, s),
+            |m, now, memory, s| ring(m, now.since, memory, s),
         )
         .with_sentence("{place} rings at {frequency} with a damping ratio of {damping}.")
         .magnitude(MODE)
@@ -81,7 +81,7 @@ fn dynamics() -> Vec<EffectKind> {
         EffectKind::sensor(
             "sensor-delay",
             "s(t − delay), linear between samples",
-            |m, now, memory, s| delay(m[0], now.dt, memory, s),
+            |m, now, memory, s| delay(m[0], now.since, memory, s),
         )
         .with_sentence("{place} shows the true value {delay} late.")
         .magnitude(DELAY)

@@ -139,14 +139,21 @@ impl OwnEquations {
 fn are_together(now: &[Now<'_>]) -> bool {
     let first = &now[0];
     now.iter().all(|now| {
-        let times = [now.t, now.dt, now.first_time, now.begun];
+        let times = [now.t, now.dt, now.since, now.first_time, now.begun];
         let is_between = match (now.between, first.between) {
             (Some(own), Some(other)) => {
                 (own.next, own.holds, own.bends) == (other.next, other.holds, other.bends)
             }
             (own, other) => own.is_none() && other.is_none(),
         };
-        times == [first.t, first.dt, first.first_time, first.begun]
+        times
+            == [
+                first.t,
+                first.dt,
+                first.since,
+                first.first_time,
+                first.begun,
+            ]
             && now.u == first.u
             && is_between
     })

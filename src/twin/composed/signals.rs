@@ -158,7 +158,11 @@ impl Composed {
                 if self.parts.moves(now, added.delays) {
                     let value = self.seen(follows.of, now, x);
                     let memory = &mut x[added.states.clone()];
-                    (follows.by).next(part.m(now.theta), now.dt, value, memory);
+                    let dt = match follows.of {
+                        Seen::Input(_) => now.dt,
+                        Seen::State(_) | Seen::Output(_) => now.since,
+                    };
+                    (follows.by).next(part.m(now.theta), dt, value, memory);
                 }
             }
         }
@@ -325,6 +329,7 @@ impl LawPart {
         for (k, value) in signal.column_mut(self.target).iter_mut().enumerate() {
             let value = std::slice::from_mut(value);
             let mut now = Now::new(drive.time(k), drive.step(k), drive.input(k), &[]);
+            now.since = drive.since(k);
             if drive.is_repeated(k) {
                 // Memories advance once to the next time.
                 now.dt = drive.dt();

@@ -162,6 +162,7 @@ impl<'d> Acting<'d> {
             0 => (before.begun, before.first),
             i => (now.t - (before.steps - i) as f64 * dt, dt),
         };
+        now.since = if i < 2 { before.first } else { dt };
         now
     }
 
@@ -202,6 +203,10 @@ impl<'d> Acting<'d> {
             // Nothing moves to a replicate; what is asked here is asked at a usual step.
             now.dt = drive.dt();
         }
+        now.since = match k {
+            0 if self.before.steps == 1 => self.before.first,
+            k => drive.since(k),
+        };
         if !self.holds.is_empty() {
             let next = drive.input((k + 1).min(drive.samples() - 1));
             now.between = Some(Between {

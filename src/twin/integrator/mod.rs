@@ -31,6 +31,8 @@ pub struct Now<'a> {
     pub t: f64,
     /// Step Δt in seconds: to the next sample, or a substep where [`StateSpace::drift`](crate::twin::StateSpace::drift) is evaluated.
     pub dt: f64,
+    /// Time in seconds since the sample before, over which what a sensor remembers has moved; Δt at the first one.
+    pub(crate) since: f64,
     /// Inputs at this time.
     pub u: &'a [f64],
     /// Parameters θ.
@@ -49,6 +51,7 @@ impl<'a> Now<'a> {
         Self {
             t,
             dt,
+            since: dt,
             u,
             theta,
             between: None,
