@@ -3,6 +3,7 @@
 use super::failure::{Failure, InFile};
 use super::options::Subject;
 use super::output;
+use super::shell_word::shown;
 use crate::estimator::Project;
 use crate::progress::Progress;
 use crate::storage::work::{Ranks, Share};
@@ -134,7 +135,7 @@ impl Context<'_> {
         self.print(&json, || {
             format!(
                 "{}: {done} of {of} {pieces} done; when all shards are done, rerun without --shard to merge",
-                folder.display()
+                shown(folder)
             )
         })
     }

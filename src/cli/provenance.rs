@@ -194,14 +194,13 @@ impl Provenance {
         ];
         parts.extend(self.date.clone());
         parts.extend(self.files.iter().map(|file| {
-            let path = file.path.display();
+            let path = shell_word::shown(&file.path);
             match &file.sha256 {
                 Some(sum) => format!("{path} (sha256 {})", &sum[..digits.min(sum.len())]),
-                None => path.to_string(),
+                None => path,
             }
         }));
-        // A line is one, whatever is in a file's name.
-        parts.join(", ").replace('\n', "\u{fffd}")
+        parts.join(", ")
     }
 }
 

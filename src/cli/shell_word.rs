@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::fmt::Write;
+use std::path::Path;
 
 /// Signs, besides letters and digits, that mean nothing to a shell within a word.
 const PLAIN: &str = "_-./=:,+@%";
@@ -21,6 +22,14 @@ pub(super) fn quoted(word: &OsStr) -> String {
             format!("'{}'", text.replace('\'', r"'\''"))
         }
         _ => escaped(word.as_encoded_bytes()),
+    }
+}
+
+/// A file's name in a text: as it is, in the form of [`quoted`] where it holds control characters or no text.
+pub(super) fn shown(path: &Path) -> String {
+    match path.to_str() {
+        Some(text) if !text.contains(char::is_control) => text.to_owned(),
+        _ => quoted(path.as_os_str()),
     }
 }
 
@@ -67,6 +76,8 @@ mod tests {
         ] {
             assert_eq!(quoted(OsStr::new(word)), expected);
         }
+        assert_eq!(shown(Path::new("it's a b")), "it's a b");
+        assert_eq!(shown(Path::new("a\nb")), r"$'a\012b'");
     }
 
     #[cfg(unix)]

@@ -37,11 +37,11 @@ impl StoppedCall {
         // What is finished inside the folder of the work is a piece of it.
         let is_piece = |result: &&Path| self.kept.iter().any(|kept| result.starts_with(kept));
         if let Some(result) = result().filter(|result| !is_piece(result)) {
-            return format!("stopped; {} is complete", result.display());
+            return format!("stopped; {} is complete", shell_word::shown(result));
         }
         match &self.kept {
             Some(folder) if has_pieces(folder) => {
-                let folder = folder.display();
+                let folder = shell_word::shown(folder);
                 format!("stopped; finished work is kept in {folder}; resume with: {resume}")
             }
             Some(folder) if folder.exists() => {

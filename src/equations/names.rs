@@ -155,6 +155,11 @@ impl<'t> Scope<'t> {
 
     /// Adds an expression to the graph.
     pub fn value(&mut self, placed: &PlacedExpression) -> Result<Id, EquationsError> {
+        self.value_of(placed, Varies::ByState)
+    }
+
+    /// As [`value`](Self::value), of names that depend on no more than `most`.
+    fn value_of(&mut self, placed: &PlacedExpression, most: Varies) -> Result<Id, EquationsError> {
         let mut stack: Vec<Id> = Vec::new();
         let fault = || {
             EquationsError::at(
@@ -168,7 +173,7 @@ impl<'t> Scope<'t> {
             let id = match item {
                 Item::Number(value) => self.graph.number(*value),
                 Item::Name(name, at) => {
-                    let node = self.meaning(name);
+                    let node = self.meaning(name, most);
                     match node {
                         Ok(id) => id,
                         Err(problem) => {
@@ -219,15 +224,15 @@ impl<'t> Scope<'t> {
         most: Varies,
         what: &str,
     ) -> Result<Id, EquationsError> {
-        let id = self.value(placed)?;
+        let id = self.value_of(placed, most)?;
         match self.graph.get(id).1 <= most {
             true => Ok(id),
             false => Err(placed.problem(&self.source, (0, what.to_owned()))),
         }
     }
 
-    /// The value that a name stands for, or the problem.
-    fn meaning(&mut self, name: &str) -> Result<Id, String> {
+    /// The value that a name stands for, or the problem, which offers names that depend on no more than `most`.
+    fn meaning(&mut self, name: &str, most: Varies) -> Result<Id, String> {
         let node = match self.meanings.get(name) {
             Some((Meaning::Parameter(index), _)) => Node::Parameter(*index),
             Some((Meaning::State(index), _)) => Node::State(*index),
@@ -245,17 +250,28 @@ impl<'t> Scope<'t> {
             }
             None if name == "t" => Node::Time,
             None if name == "pi" => return Ok(self.graph.number(std::f64::consts::PI)),
-            None => return Err(self.unknown(name)),
+            None => return Err(self.unknown(name, most)),
         };
         Ok(self.graph.add(node))
     }
 
-    fn unknown(&self, name: &str) -> String {
-        let usable = |meaning: &Meaning| !matches!(meaning, Meaning::Output);
+    fn unknown(&self, name: &str, most: Varies) -> String {
+        let usable = |meaning: &Meaning| match meaning {
+            Meaning::Parameter(_) => Varies::ByParameters <= most,
+            Meaning::Input(_) => Varies::ByStep <= most,
+            Meaning::State(_) => Varies::ByState <= most,
+            // One that waits for others may depend on anything.
+            Meaning::Defined(index) => {
+                let varies = self.defined[*index].map(|id| self.graph.get(id).1);
+                varies.unwrap_or(Varies::ByState) <= most
+            }
+            Meaning::Output => false,
+        };
         let mut known: Vec<&str> = (self.meanings.iter())
             .filter(|(_, (meaning, _))| usable(meaning))
             .map(|(name, _)| name.as_str())
-            .chain(["t", "pi"])
+            .chain((Varies::ByStep <= most).then_some("t"))
+            .chain(["pi"])
             .collect();
         known.sort_unstable();
         let near = did_you_mean(name, &known);

@@ -82,7 +82,7 @@ pub enum RecordError {
     },
     /// A step that differs from the others where all need to be the same.
     #[error(
-        "row {row}, column t: a step of {} s where {} s is usual; features need one step: resample the record, or fit or diagnose it without an estimator",
+        "row {row}, column t: a step of {} s in place of {} s; features need one step: resample the record, or fit or diagnose it without an estimator",
         number(*given),
         number(*expected)
     )]
@@ -91,7 +91,7 @@ pub enum RecordError {
         row: usize,
         /// The step in seconds.
         given: f64,
-        /// The median step in seconds.
+        /// The step in seconds that is needed: the study's, or the median one.
         expected: f64,
     },
     /// Steps that vary where a twin takes one.

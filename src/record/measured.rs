@@ -293,7 +293,7 @@ mod tests {
         let uneven = Drive::with_times(&times, Signal::zeros((4, 0))).unwrap();
         let uneven = Record::new(uneven, Signal::zeros((4, 1))).unwrap();
         let refused = uneven.check_complete().unwrap_err().to_string();
-        let expected = "row 5, column t: a step of 0.3 s where 0.1 s is usual;";
+        let expected = "row 5, column t: a step of 0.3 s in place of 0.1 s;";
         assert!(refused.starts_with(expected), "{refused}");
         let message = |outputs| record(outputs).unwrap_err().to_string();
         let one = record([1.0, nan, 2.0, nan, 3.0, nan]).unwrap();

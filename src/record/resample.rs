@@ -2,7 +2,7 @@
 
 use super::table::MOST_SAMPLES;
 use crate::math::three_digits;
-use crate::record::{Drive, Record, RecordError, Signal, UNIFORM};
+use crate::record::{Drive, Record, RecordError, Signal, UNIFORM, check_sizes};
 use crate::setting::{count, number};
 use crate::storage::untrusted::MOST_NUMBERS;
 
@@ -56,6 +56,8 @@ pub fn resample(
         )));
     }
     let drive = record.drive();
+    check_sizes(drive.inputs(), "input", &[])?;
+    check_sizes(record.outputs(), "output", &[])?;
     let (inputs, outputs) = (drive.inputs().ncols(), record.outputs().ncols());
     let length = drive.time(record.samples() - 1);
     let steps = (length / step + SAME).floor();

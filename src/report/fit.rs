@@ -167,11 +167,11 @@ pub(crate) fn profiles_svg(study: &Study, fit: &Fit) -> String {
     chart(&title, &description, &axes)
 }
 
-/// The largest free-run error of an output over its deviation; none where a free run diverges.
+/// The largest free-run error of an output over its deviation, not a number where neither ever moves; none where a free run diverges.
 fn off(fit: &Fit) -> Option<f64> {
     let each = fit.errors.iter().map(|e| Some(e.free_run? / e.deviation));
     each.collect::<Option<Vec<f64>>>()
-        .map(|all| all.into_iter().fold(0.0, f64::max))
+        .map(|all| all.into_iter().fold(f64::NAN, f64::max))
 }
 
 fn headline(fit: &Fit) -> String {
@@ -187,6 +187,7 @@ fn headline(fit: &Fit) -> String {
         }
         None => format!("{fitted}: the free run diverges."),
         Some(off) if off >= 1.0 => format!("{fitted}: the free run does not follow the record."),
+        Some(off) if off.is_nan() => format!("{fitted}: neither record nor free run ever moves."),
         Some(off) => format!(
             "{fitted}: the error of the free run is {} of the record's deviation.",
             percent(off)
@@ -376,5 +377,10 @@ mod tests {
         assert!(!page.contains("NaN") && !page.contains("<script"));
         let text = document.text();
         assert!(text.lines().nth(3).unwrap().starts_with("nu "), "{text}");
+        // A share of nothing is no share.
+        let mut still = fit;
+        still.convergence.converged = true;
+        (still.errors[0].free_run, still.errors[0].deviation) = (Some(0.0), 0.0);
+        assert!(headline(&still).ends_with("neither record nor free run ever moves."));
     }
 }

@@ -127,7 +127,9 @@ impl Parameter {
         let is_wrong = |of: &Interval| of.check().is_err() || !of.is_finite();
         let kinds = [("prior", prior), ("bounds", bounds)];
         let problem = if let Some((kind, wrong)) = kinds.iter().find(|(_, of)| is_wrong(of)) {
-            format!("{kind} of {name} is {wrong}; write finite [low, high] with low < high")
+            format!(
+                "{kind} of {name} is {wrong}; write finite [low, high] with low < high and a finite width"
+            )
         } else if !bounds.contains(prior.low()) || !bounds.contains(prior.high()) {
             format!(
                 "prior {prior} of {name} leaves its bounds {bounds}; shrink the prior or widen the bounds"
@@ -381,7 +383,7 @@ mod tests {
         let error = space.check().unwrap_err().to_string();
         assert_eq!(
             error,
-            "prior of k4 is [1.2, 0.8]; write finite [low, high] with low < high"
+            "prior of k4 is [1.2, 0.8]; write finite [low, high] with low < high and a finite width"
         );
     }
 

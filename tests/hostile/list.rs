@@ -452,3 +452,83 @@ fn a_damaged_bank_is_named_with_its_remedy() {
         &["none: ", "does not exist"],
     );
 }
+
+/// Features need the study's step: that of a record whose steps vary would be refused next.
+#[test]
+fn the_step_that_features_need_is_named() {
+    let place = tempfile::tempdir().unwrap();
+    short(place.path());
+    let rows = (0..60).map(|k| format!("{},{}\n", 0.0501 * f64::from(k + k / 30), (k * k) % 7));
+    let text = format!("t,y\n{}", rows.collect::<String>());
+    fs::write(place.path().join("uneven.csv"), text).unwrap();
+    refused(
+        place.path(),
+        "features uneven.csv --study short.toml",
+        &[
+            "in place of 0.05 s",
+            "`truetwin resample R.csv --step 0.05 --out R2.csv`",
+        ],
+    );
+}
+
+/// A record whose size cannot be computed with is refused by the verb that would write it anew.
+#[test]
+fn a_vanishing_channel_is_not_resampled() {
+    let place = tempfile::tempdir().unwrap();
+    fs::write(
+        place.path().join("r.csv"),
+        "t,y\n0,1e-110\n1,1e-110\n2,1e-110\n",
+    )
+    .unwrap();
+    let call = "resample r.csv --step 0.5 --out r2.csv";
+    refused(
+        place.path(),
+        call,
+        &["r.csv: ", "output 1 is 1e-110", "choose a unit"],
+    );
+    assert!(!place.path().join("r2.csv").exists());
+}
+
+/// A folder is no program, whatever its permissions.
+#[test]
+fn a_folder_as_program_is_told() {
+    let place = tempfile::tempdir().unwrap();
+    fs::create_dir(place.path().join("models")).unwrap();
+    refused(
+        place.path(),
+        "check --program ./models",
+        &["it is a folder", "name the program in it"],
+    );
+}
+
+/// The next call is one that a shell takes, and a name is one line.
+#[cfg(unix)]
+#[test]
+fn the_next_call_is_one_for_a_shell() {
+    let place = tempfile::tempdir().unwrap();
+    let printed = |words: &[&str]| {
+        let mut command = Command::new(TRUETWIN);
+        let output = command
+            .args(words)
+            .current_dir(place.path())
+            .output()
+            .unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let page = printed(&["man", "--out", "my\npages"]);
+    assert!(
+        page.starts_with("$'my\\012pages': ") && page.lines().count() == 2,
+        "{page}"
+    );
+    let bank = printed(&[
+        "bank",
+        "--twin",
+        "van-der-pol",
+        "--size",
+        "64",
+        "--out",
+        "my bank",
+    ]);
+    assert!(bank.contains("--bank 'my bank' --out EST"), "{bank}");
+}

@@ -1,6 +1,7 @@
 //! `bank`: simulates a bank to disk.
 
 use crate::cli::prelude::*;
+use crate::cli::shell_word::{quoted, shown};
 use crate::estimator::shards::BankPlan;
 use crate::setting::count;
 use crate::storage::work::Share;
@@ -67,7 +68,7 @@ impl Verb for Bank {
         let filled = plan.finish(&self.out)?;
         let made = own.max(filled.rows.saturating_sub(before));
         let rate = made as f64 / seconds;
-        let folder = self.out.display();
+        let folder = shown(&self.out);
         let json = json!({
             "schema": "truetwin.bank/1", "twin": project.study().name(), "folder": output::name(&self.out),
             "size": self.size, "seed": context.seed,
@@ -76,7 +77,10 @@ impl Verb for Bank {
         });
         Provenance::new(context).print_beside(context, json, || {
             let next = match filled.there == filled.of {
-                true => format!("next: truetwin pretrain … --bank {folder} --out EST"),
+                true => format!(
+                    "next: truetwin pretrain … --bank {} --out EST",
+                    quoted(self.out.as_os_str())
+                ),
                 false => "other jobs make the other shards; merge their folders with truetwin merge".into(),
             };
             format!(

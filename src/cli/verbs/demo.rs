@@ -2,6 +2,7 @@
 
 use super::estimate::Answer;
 use crate::cli::prelude::*;
+use crate::cli::shell_word::shown;
 use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
 use crate::record::{Record, twin_csv_text};
 use crate::twin::Noise;
@@ -78,7 +79,7 @@ impl Verb for Demo {
             folder.finish()?;
             output::say(&format!(
                 "demo: {0}/overlay.svg shows measured and twin, {0}/record.csv is the record",
-                out.display()
+                shown(out)
             ));
             Ok(())
         };

@@ -1,6 +1,7 @@
 //! `features`: compresses records to features.
 
 use crate::cli::prelude::*;
+use crate::cli::shell_word::shown;
 use crate::estimator::bank::file;
 use crate::setting::count;
 use ndarray::Array2;
@@ -55,7 +56,7 @@ impl Verb for Features {
             None => file::features_csv_text(&features).map_err(Failure::internal)?,
             Some(out) => {
                 let (rows, n) = features.dim();
-                format!("{}: {rows} × {}", out.display(), count(n, "feature"))
+                format!("{}: {rows} × {}", shown(out), count(n, "feature"))
             }
         };
         context.print(&json, || text)

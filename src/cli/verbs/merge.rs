@@ -1,6 +1,7 @@
 //! `merge`: merges the banks of a job array.
 
 use crate::cli::prelude::*;
+use crate::cli::shell_word::shown;
 use crate::estimator::bank::file;
 use crate::estimator::shards::{merge, merge_into_file};
 use crate::setting::count;
@@ -33,7 +34,7 @@ impl Verb for Merge {
                 self.out.display()
             )));
         }
-        let out = self.out.display();
+        let out = shown(&self.out);
         let progress = context.progress;
         let (what, merged) = match file::is_named(&self.out) {
             true => (

@@ -2,6 +2,7 @@
 
 use crate::cli::options::seconds;
 use crate::cli::prelude::*;
+use crate::cli::shell_word::{quoted, shown};
 use crate::estimator::bank::{Bank, file};
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::estimator::{EstimatorError, PretrainOptions, Pretraining, Project};
@@ -80,12 +81,12 @@ impl Verb for Pretrain {
             format!(
                 "{}: estimator of {} from {}, {}, {}, loss {loss:.4}, {seconds:.1} s\n\
                  next: truetwin estimate RECORD.csv --estimator {}",
-                self.out.display(),
+                shown(&self.out),
                 study.twin().parameters().names().join(", "),
                 count(bank, "simulation"),
                 count(estimator.network().inputs(), "feature"),
                 count(history.epochs_run, "epoch"),
-                self.out.display(),
+                quoted(self.out.as_os_str()),
             )
         })
     }

@@ -1,6 +1,7 @@
 //! `resample`: puts a record on a time grid of one step.
 
 use crate::cli::prelude::*;
+use crate::cli::shell_word::shown;
 use crate::math::six_digits;
 use crate::record::{InputRule, Record, RecordError, Resampled, resample};
 use crate::setting::{count, number};
@@ -81,8 +82,8 @@ impl Verb for Resample {
 impl Resample {
     fn text(&self, record: &Record, new: &Resampled) -> String {
         let mut lines = vec![
-            grid_line(&self.record.display().to_string(), record),
-            grid_line(&self.out.display().to_string(), &new.record),
+            grid_line(&shown(&self.record), record),
+            grid_line(&shown(&self.out), &new.record),
         ];
         if record.drive().inputs().ncols() > 0 {
             lines.push(match self.inputs {

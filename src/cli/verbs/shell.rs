@@ -1,6 +1,7 @@
 //! `completions` and `man`: shell completion and manual pages, generated from the options.
 
 use crate::cli::prelude::*;
+use crate::cli::shell_word::{quoted, shown};
 use crate::setting::did_you_mean;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Command};
@@ -61,8 +62,10 @@ impl Verb for Man {
             let json =
                 json!({ "schema": "truetwin.man/1", "folder": output::name(out), "pages": names });
             return context.print(&json, || {
-                let (out, program) = (out.display(), context.program);
-                format!("{out}: {} pages\nnext: man {out}/{program}.1", names.len())
+                let page = out.join(format!("{}.1", context.program));
+                let folder = shown(out);
+                let page = quoted(page.as_os_str());
+                format!("{folder}: {} pages\nnext: man {page}", names.len())
             });
         }
         let verb = self.verb.as_deref().unwrap_or_default();

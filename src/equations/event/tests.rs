@@ -297,6 +297,11 @@ fn faults_of_events_have_their_place() {
             "at = [1, \"h\"]\nset = { h = 0 }",
             "line 8, column 11: the time of an event moves",
         ),
+        // What may not stand there is not offered.
+        (
+            "at = \"hh\"\nset = { h = 0 }",
+            "unknown name \"hh\"; there are k, pi",
+        ),
         ("at = []\nset = { h = 0 }", "one time or more"),
         ("at = inf\nset = { h = 0 }", "times in seconds"),
         (

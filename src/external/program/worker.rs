@@ -5,6 +5,7 @@ use crate::storage::files::with_remedy;
 use crate::storage::untrusted::{excerpt, one_line};
 use crate::study::StudyError;
 use std::io::{self, Read, Write};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex};
@@ -50,7 +51,10 @@ impl ProgramCommand {
     pub(super) fn not_started(&self, error: &std::io::Error) -> StudyError {
         StudyError::Simulator(format!(
             "the program `{self}` cannot be started: {}",
-            with_remedy(error)
+            match Path::new(&self.program).is_dir() {
+                true => "it is a folder; name the program in it".into(),
+                false => with_remedy(error),
+            }
         ))
     }
 

@@ -296,7 +296,7 @@ fn wrong_records_are_named_by_file_row_column_value_and_remedy() {
     estimate(
         &file("jump.csv", &rows(&jump)),
         &[
-            "jump.csv: row 52, column t: a step of 0.1 s where 0.05 s",
+            "jump.csv: row 52, column t: a step of 0.1 s in place of 0.05 s",
             "resample",
         ],
     );
