@@ -211,6 +211,12 @@ pub(super) fn call(program: &str, words: &[OsString]) -> String {
     while let Some(word) = rest.next() {
         let text = word.to_string_lossy();
         let name = text.split('=').next().unwrap_or_default();
+        if text == "--" {
+            // No option stands behind it.
+            call.push(word);
+            call.extend(rest.map(OsString::as_os_str));
+            break;
+        }
         match SILENT.iter().find(|(silent, _)| *silent == name) {
             Some((_, true)) if !text.contains('=') => {
                 rest.next();
@@ -225,6 +231,13 @@ pub(super) fn call(program: &str, words: &[OsString]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What changes no result is left out, but for a file of that name.
+    #[test]
+    fn a_call_is_the_one_to_repeat() {
+        let words = ["/bin/truetwin", "fit", "--json", "-q", "--", "--json"].map(OsString::from);
+        assert_eq!(call("truetwin", &words), "truetwin fit -q -- --json");
+    }
 
     /// The last line of a text repeats the result: version, seed, files with their checksums, call.
     #[test]

@@ -160,7 +160,7 @@ impl Remedy for StudyError {
             Self::Twice { table, .. } => format!("[fixed] and [{table}] of the study file"),
             Self::AllFixed => "`truetwin fit` tests the twin on a record".into(),
             Self::UnknownEffect { .. } | Self::Without(_) => {
-                "`truetwin effects --twin T` lists those of a twin".into()
+                "`truetwin effects` lists them, with the --twin, --study, --program or --fmu of this call".into()
             }
             Self::NoInput(_) => {
                 "[record] input = { levels = [low, high], hold = n }, a file, or a plan for each input, in the study file"

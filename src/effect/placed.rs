@@ -56,7 +56,9 @@ impl Effect {
                 }
                 None if own == Some(key) => (
                     "id",
-                    format!("acts between two states; add {key} = \"the other state\""),
+                    format!(
+                        "acts between two states; add {key} = \"…\", the name of the other one"
+                    ),
                 ),
                 _ => continue,
             };

@@ -3,7 +3,7 @@
 use super::declared::{Declared, NoiseValue, StartValue};
 use super::entries::{TableEntry, entries};
 use super::error::EquationsError;
-use super::event::{EventText, events};
+use super::event::{EVENT, EventText, events};
 use super::graph::{Graph, Id, Varies};
 use super::names::{Meaning, Scope};
 use super::place::{SourceText, number};
@@ -81,7 +81,11 @@ pub(crate) fn take(
         .keys()
         .find_map(|key| Some((key, meant(key.get_ref())?)))
     {
-        let problem = format!("[{}] is no table of a twin; write [{table}]", key.get_ref());
+        let written = match table {
+            EVENT => "[[event]]".to_owned(),
+            table => format!("[{table}]"),
+        };
+        let problem = format!("[{}] is no table of a twin; write {written}", key.get_ref());
         return SourceText(text).error(key.span().start, problem);
     }
     let given = |table: &&str| file.get(*table).is_some();

@@ -83,7 +83,8 @@ impl Table {
         }
         let header: Vec<&str> = header.iter().collect();
         if wanted.is_usual() {
-            check_header(&header).map_err(|problem| RecordError::file(path, problem))?;
+            check_header(&header, reader.line())
+                .map_err(|problem| RecordError::file(path, problem))?;
         }
         let (usual, inputs, outputs) = (wanted.usual_names(&header))
             .and_then(|usual| {
@@ -309,15 +310,15 @@ fn csv_error(path: &Path, separator: u8, row: usize, error: csv::Error) -> Recor
 }
 
 /// Checks that a file begins with names of columns.
-fn check_header(names: &[&str]) -> Result<(), &'static str> {
+fn check_header(names: &[&str], row: usize) -> Result<(), String> {
     if names.iter().all(|name| name.is_empty()) {
-        return Err("the file is empty; a record needs a header t,u,y and rows");
+        return Err("the file is empty; a record needs a header t,u,y and rows".into());
     }
     let is_number = |name: &&str| name.replacen(',', ".", 1).parse::<f64>().is_ok();
     match names.iter().all(is_number) {
-        true => {
-            Err("row 1 holds numbers, not the names of the columns; add a first row such as t,u,y")
-        }
+        true => Err(format!(
+            "row {row} holds numbers, not the names of the columns; add a row before it such as t,u,y"
+        )),
         false => Ok(()),
     }
 }

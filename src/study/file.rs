@@ -9,7 +9,7 @@ use crate::storage::untrusted::{all_keyed, check_names, line, message, read_text
 use crate::study::error::StudyError;
 use crate::study::noise_table::NoiseTable;
 use crate::study::plan::grid_of_files;
-use crate::study::tables::{Library, PriorTable, RecordTable, check_shapes, dotted};
+use crate::study::tables::{Library, PriorTable, RecordTable, check_shapes, check_tables, dotted};
 use crate::twin::{Interval, StartLevel, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -165,6 +165,8 @@ impl StudyFile {
             .map_err(|(start, problem)| wrong(line(text, start), &problem))?;
         let equations =
             equations::take(text, table.get_mut()).map_err(|error| error.in_file(path))?;
+        check_tables(table.get_ref())
+            .map_err(|(start, problem)| wrong(line(text, start), &problem))?;
         let mut rest: toml::Table = toml::from_str(text).map_err(syntax)?;
         if equations.is_some() {
             rest.retain(|key, _| !equations::TABLES.contains(&key));
@@ -395,6 +397,18 @@ mod tests {
             (
                 "twin = 'tanks'\nstep = 1\n",
                 "s.toml, line 2: unknown key `step`",
+            ),
+            (
+                "twin = 'tanks'\n\n[priors]\nk1 = [0.4, 0.8]\n",
+                "s.toml, line 3: unknown key `priors` (did you mean \"prior\"?), expected one of twin, parameters,",
+            ),
+            (
+                "[states]\nh = { rate = '1' }\n[outputz]\n",
+                "unknown key `outputz` (did you mean \"outputs\"?)",
+            ),
+            (
+                "[states]\nh = { rate = '1' }\n[[events]]\nat = 1\n",
+                "[events] is no table of a twin; write [[event]]",
             ),
             (
                 "twin = 'tanks'\n[prior]\nk1 = [0.8, 0.4]\n",

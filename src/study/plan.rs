@@ -272,11 +272,18 @@ fn read(path: &Path, channels: usize) -> Result<Drive, StudyError> {
 }
 
 fn check_one_step(path: &Path, drive: &Drive) -> Result<(), StudyError> {
-    match drive.is_uniform() {
-        true => Ok(()),
-        false => Err(StudyError::Plan(format!(
-            "{}, column t: the steps vary; simulated records need one step: write the inputs with one",
-            path.display()
+    let off = |k: &usize| (drive.step(*k) - drive.dt()).abs() > UNIFORM * drive.dt();
+    match (0..drive.samples())
+        .find(off)
+        .filter(|_| !drive.is_uniform())
+    {
+        None => Ok(()),
+        Some(k) => Err(StudyError::Plan(format!(
+            "{}, row {}, column t: a step of {} s in place of {} s; simulated records need one step: write the inputs with one",
+            path.display(),
+            drive.rows().line(k + 1),
+            number(six_digits(drive.step(k))),
+            number(six_digits(drive.dt()))
         ))),
     }
 }
@@ -499,7 +506,10 @@ mod tests {
                 "3 samples, step 2 s; simulated records have 3, step 1 s",
             ),
             ("0,1\n1,1\n", "2 samples, step 1 s"),
-            ("0,1\n1,1\n3,1\n", "the steps vary"),
+            (
+                "0,1\n1,1\n3,1\n",
+                "row 4, column t: a step of 2 s in place of 1 s",
+            ),
             ("5,1\n6,1\n7,1\n", "begins at 5 s"),
         ] {
             let other = write("other.csv", rows);

@@ -1,7 +1,10 @@
 //! Tables of a study file.
 
 use crate::effect::{Effect, EffectKey, EffectPattern};
+use crate::equations;
 use crate::record::Columns;
+use crate::setting::did_you_mean;
+use crate::storage::untrusted::excerpt;
 use crate::study::input_plan::PlannedInputs;
 use crate::twin::{Hold, Integrator, Interval};
 use serde::de::{DeserializeOwned, Error};
@@ -161,6 +164,30 @@ fn flatten<V: DeserializeOwned>(
                 let value = V::deserialize(value).map_err(|e| format!("{key}: {}", e.message()))?;
                 flat.insert(key, value);
             }
+        }
+    }
+    Ok(())
+}
+
+/// Tables of a study file beside those of equations.
+const OWN_TABLES: [&str; 10] = [
+    "record", "prior", "bounds", "fixed", "limits", "noise", "start", "features", "effect",
+    "library",
+];
+
+/// Refuses a table that neither a study nor a twin has, with its place in the text.
+pub(super) fn check_tables(file: &DeTable<'_>) -> Result<(), (usize, String)> {
+    let known = [&equations::TABLES[..], &OWN_TABLES[..]].concat();
+    for key in file.keys() {
+        let name: &str = key.get_ref();
+        if !known.contains(&name) {
+            let problem = format!(
+                "unknown key `{}`{}, expected one of {}",
+                excerpt(name),
+                did_you_mean(name, &known),
+                known.join(", ")
+            );
+            return Err((key.span().start, problem));
         }
     }
     Ok(())

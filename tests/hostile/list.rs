@@ -379,7 +379,25 @@ fn nothing_is_ignored_without_a_word() {
     let place = with_record();
     let study = "twin = 'van-der-pol'\n[noise]\ny = { std = 0.1, known = true, factor = 2 }\n";
     fs::write(place.path().join("noise.toml"), study).unwrap();
+    short(place.path());
+    fs::write(place.path().join("bank.csv"), "nu,x1\n1.0,0.5\n99,0.5\n").unwrap();
+    assert!(
+        run(place.path(), "bank --study short.toml --size 64 --out bank")
+            .status
+            .success()
+    );
+    let manifest = place.path().join("bank/manifest.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("\"seed\": 1", "\"seed\": 2")).unwrap();
     for (call, parts) in [
+        (
+            "pretrain --study short.toml --bank bank --epochs 1 --out v.est",
+            ["bank: ", "its manifest.json was altered"],
+        ),
+        (
+            "pretrain --study short.toml --bank bank.csv --epochs 1 --out v.est",
+            ["bank.csv: ", "row 3: nu = 99 is outside its bounds [0, 7]"],
+        ),
         (
             "simulate --twin van-der-pol --theta nu=1 --columns y=level",
             ["--columns", "give --input"],
@@ -395,6 +413,15 @@ fn nothing_is_ignored_without_a_word() {
     ] {
         refused(place.path(), call, &parts);
     }
+    let program = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/pendulum.py");
+    let compare = "compare short.toml short.toml --record r.csv --validation r.csv --program";
+    let mut command = Command::new(TRUETWIN);
+    command
+        .args(compare.split(' '))
+        .arg(format!("python3 '{program}'"));
+    let output = command.current_dir(place.path()).output().unwrap();
+    let parts = ["none of the studies is of the twin pendulum", "remove it"];
+    one_line(compare, &output, &parts);
 }
 
 #[cfg(unix)]

@@ -155,6 +155,11 @@ impl Shards {
         checked.map_err(|reason| damaged(&self.place(number), &reason))
     }
 
+    /// The folder's name, for messages.
+    pub fn name(&self) -> String {
+        self.folder.path().display().to_string()
+    }
+
     fn incomplete(&self) -> EstimatorError {
         let (there, of) = (self.there.len(), self.of);
         let problem =
