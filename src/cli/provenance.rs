@@ -232,7 +232,7 @@ pub(super) fn call(program: &str, words: &[OsString]) -> String {
 mod tests {
     use super::*;
 
-    /// What changes no result is left out, but for a file of that name.
+    /// Options that change no result are left out, but for a file of such a name.
     #[test]
     fn a_call_is_the_one_to_repeat() {
         let words = ["/bin/truetwin", "fit", "--json", "-q", "--", "--json"].map(OsString::from);

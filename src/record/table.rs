@@ -83,8 +83,7 @@ impl Table {
         }
         let header: Vec<&str> = header.iter().collect();
         if wanted.is_usual() {
-            check_header(&header, reader.line())
-                .map_err(|problem| RecordError::file(path, problem))?;
+            check_header(&header, reader.line(), path)?;
         }
         let (usual, inputs, outputs) = (wanted.usual_names(&header))
             .and_then(|usual| {
@@ -310,17 +309,18 @@ fn csv_error(path: &Path, separator: u8, row: usize, error: csv::Error) -> Recor
 }
 
 /// Checks that a file begins with names of columns.
-fn check_header(names: &[&str], row: usize) -> Result<(), String> {
-    if names.iter().all(|name| name.is_empty()) {
-        return Err("the file is empty; a record needs a header t,u,y and rows".into());
-    }
+fn check_header(names: &[&str], row: usize, path: &Path) -> Result<(), RecordError> {
     let is_number = |name: &&str| name.replacen(',', ".", 1).parse::<f64>().is_ok();
-    match names.iter().all(is_number) {
-        true => Err(format!(
+    let problem = if names.iter().all(|name| name.is_empty()) {
+        "the file is empty; a record needs a header t,u,y and rows".into()
+    } else if names.iter().all(is_number) {
+        format!(
             "row {row} holds numbers, not the names of the columns; add a row before it such as t,u,y"
-        )),
-        false => Ok(()),
-    }
+        )
+    } else {
+        return Ok(());
+    };
+    Err(RecordError::file(path, problem))
 }
 
 /// The usual name of a column, and its own.
