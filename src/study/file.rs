@@ -403,8 +403,8 @@ mod tests {
                 "s.toml, line 3: unknown key `priors` (did you mean \"prior\"?), expected one of twin, parameters,",
             ),
             (
-                "[states]\nh = { rate = '1' }\n[outputz]\n",
-                "unknown key `outputz` (did you mean \"outputs\"?)",
+                "[parameters]\nk = { prior = [0, 1] }\n[states]\nh = { rate = 'k' }\n[outputs]\ny = { value = 'h' }\n[outputz]\n",
+                "s.toml, line 7: unknown key `outputz` (did you mean \"outputs\"?)",
             ),
             (
                 "[states]\nh = { rate = '1' }\n[[events]]\nat = 1\n",
