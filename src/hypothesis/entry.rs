@@ -52,10 +52,7 @@ impl Placed {
         let value = of.value(now.t, x, now.u, signal);
         let variable = match trace {
             Some(trace) => {
-                let dt = match of {
-                    Of::Input(_) => now.dt,
-                    _ => now.since,
-                };
+                let dt = now.memory_step(matches!(of, Of::Input(_)));
                 trace.step(x[self.memory], value, dt)
             }
             None => value,

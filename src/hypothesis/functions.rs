@@ -275,7 +275,7 @@ fn of_part(target: &str, name: &str, function: Entered, largest: f64) -> Term {
 pub(super) fn of_past(target: &str, is_sensor: bool, name: &str, times: [f64; PASTS]) -> Term {
     let id = format!("past({name})");
     let law = move |m: &[f64], now: &Now<'_>, memory: &mut [f64], s: f64| {
-        let (mut sum, dt) = (s, if is_sensor { now.since } else { now.dt });
+        let (mut sum, dt) = (s, now.memory_step(!is_sensor));
         for ((m, z), tau) in m.iter().zip(memory).zip(times) {
             sum += m * (lag(tau, dt, z, s) - s);
         }
@@ -302,19 +302,15 @@ pub(super) fn of_trace(
 ) -> Term {
     let id = format!("f({})", variable.name);
     let ends = variable.ends();
-    let law = move |m: &[f64], now: &Now<'_>, memory: &mut [f64], s: f64| {
-        let dt = match entry {
-            Entry::Sensor(_) => now.since,
-            Entry::Actuator(_) | Entry::State(_) | Entry::Parameter(_) => now.dt,
-        };
-        memory[0] = trace.step(memory[0], s, dt);
-        s + sum_of_one(m, memory[0], ends)
-    };
-    let formulas = ["s + f(trace of s)", "u + f(trace of u)"];
     let (is_sensor, of) = match entry {
         Entry::Sensor(j) => (true, Of::Output(j)),
         Entry::Actuator(i) | Entry::State(i) | Entry::Parameter(i) => (false, Of::Input(i)),
     };
+    let law = move |m: &[f64], now: &Now<'_>, memory: &mut [f64], s: f64| {
+        memory[0] = trace.step(memory[0], s, now.memory_step(!is_sensor));
+        s + sum_of_one(m, memory[0], ends)
+    };
+    let formulas = ["s + f(trace of s)", "u + f(trace of u)"];
     Term {
         trail: Some(Trail::new(entry, of, trace, ends)),
         ..term(

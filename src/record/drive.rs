@@ -246,6 +246,13 @@ impl Drive {
         }
     }
 
+    /// Row whose step differs most from Δt; none where all are Δt.
+    pub(crate) fn oddest_step(&self) -> Option<usize> {
+        let off = |k: &usize| (self.step(*k) - self.dt).abs();
+        let farthest = (0..self.samples()).max_by(|a, b| off(a).total_cmp(&off(b)));
+        farthest.filter(|_| !self.is_uniform())
+    }
+
     /// Returns whether the next row is another reading of the state of row k.
     #[inline]
     pub(crate) fn is_repeated(&self, k: usize) -> bool {
@@ -448,6 +455,17 @@ impl PartialEq for FileRows {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Steps that are each near the median, and lead away from one grid, have an oddest one all the same.
+    #[test]
+    fn a_grid_that_drifts_has_an_oddest_step() {
+        let time = |k: u32| f64::from(k) + 8e-4 * f64::from(k.saturating_sub(100));
+        let times: Vec<f64> = (0..200).map(time).collect();
+        let drive = Drive::with_times(&times, Signal::zeros((200, 0))).unwrap();
+        assert!(!drive.is_uniform() && drive.oddest_step().is_some());
+        let even = Drive::autonomous(0.1, 200).unwrap();
+        assert_eq!(even.oddest_step(), None);
+    }
 
     #[test]
     fn sizes_that_cannot_be_squared_are_refused_infinite_ones_too() {

@@ -165,6 +165,11 @@ impl Record {
     ///
     /// [`RecordError::Incomplete`], which names the first place; [`RecordError::Uneven`], which names the oddest step.
     pub fn check_complete(&self) -> Result<(), RecordError> {
+        self.check_complete_at(six_digits(self.drive.dt()))
+    }
+
+    /// As [`check_complete`](Self::check_complete), for features that need this step.
+    pub(crate) fn check_complete_at(&self, expected: f64) -> Result<(), RecordError> {
         let mut cells = self.outputs.indexed_iter();
         if let Some(((k, j), _)) = cells.find(|(_, v)| v.is_nan()) {
             return Err(RecordError::Incomplete {
@@ -172,18 +177,14 @@ impl Record {
                 column: column_names("y", self.outputs.ncols()).swap_remove(j),
             });
         }
-        let drive = &self.drive;
-        if drive.is_uniform() {
-            return Ok(());
+        match self.drive.oddest_step() {
+            None => Ok(()),
+            Some(k) => Err(RecordError::Uneven {
+                row: self.drive.rows().line(k + 1),
+                given: six_digits(self.drive.step(k)),
+                expected,
+            }),
         }
-        let off = |k: &usize| (drive.step(*k) - drive.dt()).abs();
-        let farthest = (0..self.samples()).max_by(|a, b| off(a).total_cmp(&off(b)));
-        let k = farthest.unwrap_or_default();
-        Err(RecordError::Uneven {
-            row: drive.rows().line(k + 1),
-            given: six_digits(drive.step(k)),
-            expected: six_digits(drive.dt()),
-        })
     }
 
     /// The first samples; `None` where an output of the record has no value in them.

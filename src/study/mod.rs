@@ -332,19 +332,9 @@ impl Study {
     /// Checks whether features can be taken of a record: it has the step and the channels of this study, and no output is missing.
     pub fn check_record(&self, record: &Record) -> Result<(), StudyError> {
         let plan = self.needed_plan()?;
-        match self.check_complete(record) {
-            // One step does not do where the study has another.
-            Err(StudyError::Record(RecordError::Uneven { row, given, .. })) => {
-                let expected = plan.step;
-                Err(RecordError::Uneven {
-                    row,
-                    given,
-                    expected,
-                }
-                .into())
-            }
-            wrong => wrong.and_then(|()| plan.check_step(record)),
-        }
+        self.check_channels(record)?;
+        record.check_complete_at(plan.step)?;
+        plan.check_step(record)
     }
 
     /// Checks that a record has the channels of this study, and that no output is missing.

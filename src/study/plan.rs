@@ -272,11 +272,7 @@ fn read(path: &Path, channels: usize) -> Result<Drive, StudyError> {
 }
 
 fn check_one_step(path: &Path, drive: &Drive) -> Result<(), StudyError> {
-    let off = |k: &usize| (drive.step(*k) - drive.dt()).abs() > UNIFORM * drive.dt();
-    match (0..drive.samples())
-        .find(off)
-        .filter(|_| !drive.is_uniform())
-    {
+    match drive.oddest_step() {
         None => Ok(()),
         Some(k) => Err(StudyError::Plan(format!(
             "{}, row {}, column t: a step of {} s in place of {} s; simulated records need one step: write the inputs with one",

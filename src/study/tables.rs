@@ -169,15 +169,9 @@ fn flatten<V: DeserializeOwned>(
     Ok(())
 }
 
-/// Tables of a study file beside those of equations.
-const OWN_TABLES: [&str; 10] = [
-    "record", "prior", "bounds", "fixed", "limits", "noise", "start", "features", "effect",
-    "library",
-];
-
 /// Refuses a table that neither a study nor a twin has, with its place in the text.
 pub(super) fn check_tables(file: &DeTable<'_>) -> Result<(), (usize, String)> {
-    let known = [&equations::TABLES[..], &OWN_TABLES[..]].concat();
+    let known = [&equations::TABLES[..], &TABLES[..], &["effect"]].concat();
     for key in file.keys() {
         let name: &str = key.get_ref();
         if !known.contains(&name) {

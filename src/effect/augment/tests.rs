@@ -48,7 +48,7 @@ fn a_late_twin_is_a_twin_with_a_late_sensor() {
     }
 }
 
-/// What a sensor remembers moves over the time since the row before, however the steps vary; replicates read one state.
+/// Memories of a sensor move over the time since the row before, however the steps vary; replicates read one state.
 #[test]
 fn a_slow_sensor_counts_the_time_since_the_row_before() {
     let times = [0.0, 0.5, 2.0, 2.0, 2.0, 2.3, 5.0, 5.1, 9.0];

@@ -250,8 +250,7 @@ fn holders(all: &[Shards], of: usize) -> Result<Vec<&Shards>, EstimatorError> {
     // What is there is counted before anything is made for every shard: a manifest may speak of far more.
     let there: BTreeSet<usize> = (all.iter().flat_map(|s| s.there.keys().copied())).collect();
     if there.len() < of {
-        let folders = all.iter().take(NAMED).map(Shards::name);
-        let folders: Vec<String> = folders.collect();
+        let folders: Vec<String> = all.iter().take(NAMED).map(Shards::name).collect();
         let absent = (0..of).filter(|number| !there.contains(number));
         let mut missing: Vec<String> = absent.take(NAMED + 1).map(|n| n.to_string()).collect();
         let more = if missing.len() > NAMED { ", …" } else { "" };

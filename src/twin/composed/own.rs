@@ -138,24 +138,15 @@ impl OwnEquations {
 /// Returns whether filters differ in their parameters alone.
 fn are_together(now: &[Now<'_>]) -> bool {
     let first = &now[0];
+    let times = |now: &Now<'_>| [now.t, now.dt, now.since, now.first_time, now.begun];
     now.iter().all(|now| {
-        let times = [now.t, now.dt, now.since, now.first_time, now.begun];
         let is_between = match (now.between, first.between) {
             (Some(own), Some(other)) => {
                 (own.next, own.holds, own.bends) == (other.next, other.holds, other.bends)
             }
             (own, other) => own.is_none() && other.is_none(),
         };
-        times
-            == [
-                first.t,
-                first.dt,
-                first.since,
-                first.first_time,
-                first.begun,
-            ]
-            && now.u == first.u
-            && is_between
+        times(now) == times(first) && now.u == first.u && is_between
     })
 }
 

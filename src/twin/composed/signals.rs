@@ -158,10 +158,7 @@ impl Composed {
                 if self.parts.moves(now, added.delays) {
                     let value = self.seen(follows.of, now, x);
                     let memory = &mut x[added.states.clone()];
-                    let dt = match follows.of {
-                        Seen::Input(_) => now.dt,
-                        Seen::State(_) | Seen::Output(_) => now.since,
-                    };
+                    let dt = now.memory_step(matches!(follows.of, Seen::Input(_)));
                     (follows.by).next(part.m(now.theta), dt, value, memory);
                 }
             }

@@ -59,6 +59,13 @@ impl<'a> Now<'a> {
             begun: 0.0,
         }
     }
+
+    /// Time in seconds over which a memory moves at this sample: an input acts over the step behind it, everything else is seen after the one
+    /// before.
+    #[inline]
+    pub(crate) fn memory_step(&self, of_input: bool) -> f64 {
+        if of_input { self.dt } else { self.since }
+    }
 }
 
 /// A position between two samples.
