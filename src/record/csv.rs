@@ -159,11 +159,7 @@ fn csv_text(header: &[String], drive: &Drive, outputs: &Signal) -> String {
     let cells: Vec<_> = header.iter().map(|name| cell(name)).collect();
     let mut text = cells.join(",") + "\n";
     for k in 0..drive.samples() {
-        let t = match drive.is_uniform() {
-            true => rounded_time(drive.own_time(k), drive.dt()),
-            false => drive.own_time(k),
-        };
-        text += &t.to_string();
+        text += &drive.own_time(k).to_string();
         for value in drive.input(k).iter().chain(outputs.row(k)) {
             text.push(',');
             if !value.is_nan() {
@@ -198,13 +194,6 @@ impl Record {
     }
 }
 
-/// Time to a billionth of the step, so that 3·0.1 is written as 0.3.
-fn rounded_time(t: f64, dt: f64) -> f64 {
-    let digits = 10f64.powi(9 - dt.log10().floor() as i32);
-    let rounded = (t * digits).round() / digits;
-    if rounded.is_finite() { rounded } else { t }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -218,13 +207,20 @@ mod tests {
         Record::read(&path)
     }
 
-    /// Rows are counted as an editor does, also that of a header which is none.
+    /// Rows are counted as an editor does, also that of a header which is none; times are written as equations see them.
     #[test]
     fn a_missing_header_has_its_row() {
         let error = written("# t,u,y\n\n0,1,2\n1,1,2\n")
             .unwrap_err()
             .to_string();
         assert!(error.contains("row 3 holds numbers"), "{error}");
+        let (inputs, outputs) = (Signal::zeros((8, 0)), Signal::ones((8, 1)));
+        let record = Record::new(Drive::new(0.1, inputs).unwrap(), outputs).unwrap();
+        let read = written(&record_csv_text(&record)).unwrap();
+        for k in 0..8 {
+            let seen = [&record, &read].map(|record| record.drive().own_time(k));
+            assert_eq!(seen, [k as f64 / 10.0; 2]);
+        }
     }
 
     fn message(text: &str) -> String {

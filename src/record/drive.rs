@@ -7,6 +7,10 @@ use crate::setting::count;
 use ndarray::{Array2, s};
 use std::sync::Arc;
 
+mod clock;
+
+use clock::Clock;
+
 /// Samples by channels: row k belongs to [`Drive::time`] of k. A system without inputs has zero columns and N rows.
 pub type Signal = Array2<f64>;
 
@@ -26,6 +30,8 @@ pub struct Drive {
     dt: f64,
     /// Time of the first row on the record's own clock, in seconds.
     first_time: f64,
+    /// Times of rows where all steps are Δt.
+    clock: Clock,
     /// Shared by copies: a fit hands its records on many times.
     inputs: Arc<Signal>,
     /// Times on the record's own clock, one a row, where steps vary.
@@ -52,6 +58,7 @@ impl Drive {
         Ok(Self {
             dt,
             first_time: 0.0,
+            clock: Clock::new(dt, 0.0),
             inputs: Arc::new(inputs),
             times: None,
             rows: FileRows::default(),
@@ -142,6 +149,7 @@ impl Drive {
             *times = times.iter().map(|t| t + shift).collect();
         }
         self.first_time = first_time;
+        self.clock = Clock::new(self.dt, first_time);
         self
     }
 
@@ -169,6 +177,7 @@ impl Drive {
         Self {
             dt: self.dt,
             first_time: self.first_time,
+            clock: self.clock,
             inputs: Arc::new(self.inputs.slice(s![..rows, ..]).to_owned()),
             times: self.times.as_ref().map(|times| times[..rows].into()),
             rows: self.rows.clone(),
@@ -183,6 +192,7 @@ impl Drive {
         Ok(Self {
             times: self.times.clone(),
             first_time: self.first_time,
+            clock: self.clock,
             rows: self.rows.clone(),
             ..Self::new(self.dt, inputs)?
         })
@@ -294,7 +304,7 @@ impl Drive {
     /// Time of sample k, in seconds from the first; steps of Δt behind the last.
     pub fn time(&self, k: usize) -> f64 {
         match &self.times {
-            None => k as f64 * self.dt,
+            None => self.clock.since(k),
             Some(times) => {
                 let last = times.len() - 1;
                 let since = times[k.min(last)] - self.first_time;
@@ -313,7 +323,8 @@ impl Drive {
     pub fn own_time(&self, k: usize) -> f64 {
         match &self.times {
             Some(times) if k < times.len() => times[k],
-            _ => self.first_time + self.time(k),
+            Some(_) => self.first_time + self.time(k),
+            None => self.clock.time(k),
         }
     }
 

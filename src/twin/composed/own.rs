@@ -138,7 +138,7 @@ impl OwnEquations {
 /// Returns whether filters differ in their parameters alone.
 fn are_together(now: &[Now<'_>]) -> bool {
     let first = &now[0];
-    let times = |now: &Now<'_>| [now.t, now.dt, now.since, now.first_time, now.begun];
+    let times = |now: &Now<'_>| [now.t, now.dt, now.end, now.since, now.first_time, now.begun];
     now.iter().all(|now| {
         let is_between = match (now.between, first.between) {
             (Some(own), Some(other)) => {

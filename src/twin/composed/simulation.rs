@@ -162,6 +162,10 @@ impl<'d> Acting<'d> {
             0 => (before.begun, before.first),
             i => (now.t - (before.steps - i) as f64 * dt, dt),
         };
+        now.end = match i + 1 == before.steps {
+            true => self.drive.own_time(0),
+            false => now.t + now.dt,
+        };
         now.since = if i < 2 { before.first } else { dt };
         now
     }
@@ -199,9 +203,11 @@ impl<'d> Acting<'d> {
     pub fn go_to<'a>(&'a self, k: usize, now: &mut Now<'a>) {
         let drive = self.drive.as_ref();
         (now.t, now.dt, now.u) = (drive.own_time(k), drive.step(k), drive.input(k));
+        now.end = drive.own_time(k + 1);
         if now.dt == 0.0 {
             // Nothing moves to a replicate; what is asked here is asked at a usual step.
             now.dt = drive.dt();
+            now.end = now.t + now.dt;
         }
         now.since = match k {
             0 if self.before.steps == 1 => self.before.first,
@@ -318,7 +324,7 @@ pub(super) fn simulate(
         }
         match x.iter().all(|v| v.is_finite()) {
             true => Ok(()),
-            false => Err(ended(work, now.t + now.dt)),
+            false => Err(ended(work, now.end)),
         }
     };
     let first = acting.start();

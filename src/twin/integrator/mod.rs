@@ -31,6 +31,8 @@ pub struct Now<'a> {
     pub t: f64,
     /// Step Δt in seconds: to the next sample, or a substep where [`StateSpace::drift`](crate::twin::StateSpace::drift) is evaluated.
     pub dt: f64,
+    /// Time at the end of the step, to the last digit that of the next sample: t + Δt may be rounded to the number beside it.
+    pub(crate) end: f64,
     /// Time in seconds since the sample before, over which what a sensor remembers has moved; Δt at the first one.
     pub(crate) since: f64,
     /// Inputs at this time.
@@ -51,6 +53,7 @@ impl<'a> Now<'a> {
         Self {
             t,
             dt,
+            end: t + dt,
             since: dt,
             u,
             theta,
@@ -412,6 +415,10 @@ impl Integrator {
             let sub = Now {
                 t: now.t + i as f64 * h,
                 dt: h,
+                end: match i + 1 == m {
+                    true => now.end,
+                    false => now.t + (i + 1) as f64 * h,
+                },
                 ..*now
             };
             let Some(between) = now.between else {
@@ -440,8 +447,9 @@ impl Integrator {
         work: &mut StepBuffers,
     ) {
         let now = Now {
-            t: path.now.t + of.from * path.now.dt,
+            t: path.time(of.from),
             dt: path.seconds(of),
+            end: path.time(of.from + of.length),
             ..*path.now
         };
         self.step_in_stages(&now, x, work, |share, _, x, dx| {
@@ -480,10 +488,7 @@ impl Integrator {
                     t: now.t + 0.5 * dt,
                     ..*now
                 };
-                let end = Now {
-                    t: now.t + dt,
-                    ..*now
-                };
+                let end = Now { t: now.end, ..*now };
                 drift(0.0, now, x, k1);
                 shifted(x, 0.5 * dt, k1, stage);
                 drift(0.5, &half, stage, k2);

@@ -29,11 +29,19 @@ impl Path<'_, '_> {
         of.length * self.now.dt
     }
 
+    /// Time at a share of the way.
+    pub fn time(&self, share: f64) -> f64 {
+        match share == 1.0 {
+            true => self.now.end,
+            false => self.now.t + share * self.now.dt,
+        }
+    }
+
     /// Rates at a part of a stretch.
     pub fn rates(&mut self, of: Stretch, part: f64, x: &[f64], dx: &mut [f64]) {
         let at = of.from + part * of.length;
         let mut stage = Now {
-            t: self.now.t + at * self.now.dt,
+            t: self.time(at),
             dt: of.length * self.now.dt,
             ..*self.now
         };
@@ -48,7 +56,7 @@ impl Path<'_, '_> {
     /// Calls `with` the time and the inputs at a share of the way.
     pub fn at<R>(&mut self, share: f64, with: impl FnOnce(&Now<'_>) -> R) -> R {
         let mut now = Now {
-            t: self.now.t + share * self.now.dt,
+            t: self.time(share),
             ..*self.now
         };
         if let Some(between) = self.now.between {

@@ -353,3 +353,59 @@ fn many_events_cost_in_proportion() {
     let [few, many] = [20, 80].map(rates);
     assert!(many < 6 * few, "{few} {many}");
 }
+
+/// A count of how often the time has passed a limit, and the time since.
+struct Alarm {
+    limit: f64,
+    rule: Integrator,
+}
+
+impl StateSpace for Alarm {
+    fn outline(&self) -> Outline {
+        let limit = self.limit;
+        let passed = Event::when("passed", move |now, _| now.t - limit, |_, x| x[0] += 1.0);
+        Outline::new()
+            .parameter(Parameter::new("k", "-", 0.5, 2.0))
+            .state("count", "-")
+            .state("since", "s")
+            .output("count", "-")
+            .output("since", "s")
+            .event(passed)
+    }
+    fn drift(&self, now: &Now<'_>, _: &[f64], dx: &mut [f64]) {
+        dx[1] = f64::from(now.t > self.limit);
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(x);
+    }
+    fn start(&self, _: &Now<'_>, _: &mut [f64]) {}
+    fn integrator(&self) -> Integrator {
+        self.rule
+    }
+}
+
+/// The end of a step and the next row are one time: what is behind the time of a row is seen once, and not at that row.
+#[test]
+fn a_time_of_a_row_is_passed_once() {
+    let rows = 60;
+    let made = Drive::autonomous(0.1, rows).unwrap();
+    let times: Vec<f64> = (0..rows).map(|k| k as f64 / 10.0).collect();
+    let read = Drive::with_times(&times, made.inputs().clone()).unwrap();
+    for rule in [
+        Integrator::Euler,
+        Integrator::RungeKutta4,
+        Integrator::Adaptive,
+        Integrator::Stiff,
+    ] {
+        for (k, drive) in (0..rows - 1).flat_map(|k| [(k, &made), (k, &read)]) {
+            let limit = times[k];
+            let y = (Alarm { limit, rule }).simulate(&[1.0], drive, Noise::OFF);
+            let y = y.unwrap();
+            for (row, y) in y.rows().into_iter().enumerate() {
+                let count = if row > k { 1.0 } else { 0.0 };
+                assert_eq!(y[0], count, "{rule:?}: row {row} of {k}");
+                assert!(row > k || y[1] == 0.0, "{rule:?}: row {row} of {k}: {y}");
+            }
+        }
+    }
+}
