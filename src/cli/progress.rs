@@ -3,6 +3,7 @@
 use super::failure::say;
 use super::stop;
 use crate::progress::{Listener, Progress};
+use crate::setting::number;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashMap;
 use std::io::{IsTerminal, stderr};
@@ -98,7 +99,7 @@ impl Open {
             return None;
         }
         self.lines = (elapsed.as_secs() / LINES.as_secs()) as u32;
-        let (done, total) = (self.done, self.total);
+        let [done, total] = [self.done, self.total].map(|n| number(n as f64));
         Some(format!(
             "{stage}: {done} of {total} done, {} s elapsed",
             elapsed.as_secs()

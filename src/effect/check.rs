@@ -86,11 +86,14 @@ fn check_place(
         }
     }
     // A twin of a single state has no other one: there, what a limit takes is lost.
-    let alone = known.iter().filter(|name| !is_memory(name)).count() == 1;
-    let lost = matches!(effect.law(), Law::Limit(_)) && alone;
+    let has_one = known.iter().filter(|name| !is_memory(name)).count() == 1;
+    let lost = matches!(effect.law(), Law::Limit(_)) && has_one;
     let of_itself = effect.kind().other_state() == Some(OtherState::RateOfOrItself);
     if effect.other() == Some(target) && !lost && !of_itself {
-        let problem = format!(" goes from {target} to itself; name another state");
+        let problem = match has_one {
+            true => format!(" goes from {target} to itself, the only state; leave the effect out"),
+            false => format!(" goes from {target} to itself; name another state"),
+        };
         return Err(refused(effect, other, &problem));
     }
     Ok(())

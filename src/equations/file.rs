@@ -13,7 +13,7 @@ use super::twin::Equations;
 use super::written::{TABLES, written};
 use crate::record::Quantity;
 use crate::setting::did_you_mean;
-use crate::storage::untrusted::{excerpt, message};
+use crate::storage::untrusted::{check_name, excerpt, message};
 use crate::twin::{
     Hold, Integrator, Interval, MOST_SUBSTEPS, Outline, Parameter, Stepping, TOLERANCES,
 };
@@ -409,9 +409,6 @@ fn name(source: SourceText<'_>, file: &DeTable<'_>) -> Result<String, EquationsE
     let Some(twin) = file.get("twin") else {
         return Ok(UNNAMED.into());
     };
-    if let Some(name) = twin.get_ref().as_str() {
-        return Ok(name.into());
-    }
     let whole = TableEntry {
         source,
         table: "twin",
@@ -419,7 +416,11 @@ fn name(source: SourceText<'_>, file: &DeTable<'_>) -> Result<String, EquationsE
         byte: twin.span().start,
         value: twin,
     };
-    let name = whole.text(whole.keys(&["name"])?, "name")?;
+    let name = match twin.get_ref().as_str() {
+        Some(name) => name.into(),
+        None => whole.text(whole.keys(&["name"])?, "name")?,
+    };
+    check_name(&name).or_else(|problem| whole.error(problem))?;
     Ok(if name.is_empty() {
         UNNAMED.into()
     } else {

@@ -154,6 +154,13 @@ fn faults_are_one_line_with_their_place() {
             "cannot stand in an expression",
         ),
         (
+            &format!(
+                "[states]\nh = {{ rate = \"1\" }}\n[twin]\nname = \"{}\"\n",
+                "a".repeat(2000)
+            ),
+            "has more than 1000 characters; shorten it",
+        ),
+        (
             "[define]\na = \"b + 1\"\nb = \"2*a\"\n[states]\nh = { rate = \"a\" }\n",
             "a definition in a circle: ",
         ),

@@ -4,7 +4,7 @@ use crate::feature::FeatureError;
 use crate::math::MathError;
 use crate::network::NetworkError;
 use crate::progress::Cancelled;
-use crate::setting::SettingError;
+use crate::setting::{SettingError, number};
 use crate::storage::StorageError;
 use crate::storage::untrusted::message;
 use crate::study::StudyError;
@@ -64,7 +64,9 @@ pub enum EstimatorError {
     Bank(String),
     /// A bank that does not fit into memory.
     #[error(
-        "bank size = {size}; at most {most} fit into memory: make a bank on disk, then pretrain from it"
+        "bank size = {}; at most {} fit into memory: make a bank on disk, then pretrain from it",
+        number(*size as f64),
+        number(*most as f64)
     )]
     TooLarge {
         /// Rows that were asked for.

@@ -131,8 +131,9 @@ pub enum FeatureError {
     Record(#[from] RecordError),
     /// Fewer samples than the features need.
     #[error(
-        "the record has {}, these features need {needed}; take a longer record, or features that need fewer",
-        count(*samples, "sample")
+        "the record has {}, these features need {}; take a longer record, or features that need fewer",
+        count(*samples, "sample"),
+        number(*needed as f64)
     )]
     TooShort {
         /// Samples of the record.

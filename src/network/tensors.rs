@@ -32,17 +32,17 @@ pub(crate) fn values_of(bytes: &[u8]) -> Vec<f32> {
         .collect()
 }
 
+/// Sees a tensor's name and shape, and changes its values.
+type Change<'c> = dyn FnMut(&str, &[usize], &mut Vec<f32>) -> Result<(), NetworkError> + 'c;
+
 /// Gives each tensor of a module, by name and shape, to `change`, and takes the values that it leaves.
-struct Walk<F> {
-    change: F,
+struct Walk<'c> {
+    change: &'c mut Change<'c>,
     /// Probability of every dropout: set in each stored number that is named `p`, as dfdx and we do.
     dropout: Option<f64>,
 }
 
-impl<F> TensorVisitor<f32, Cpu> for Walk<F>
-where
-    F: FnMut(&str, &[usize], &mut Vec<f32>) -> Result<(), NetworkError>,
-{
+impl TensorVisitor<f32, Cpu> for Walk<'_> {
     type Viewer = (ViewTensorMut, ViewTensorName);
     type Err = NetworkError;
     type E2 = f32;
@@ -80,7 +80,7 @@ fn change_each<M: TensorCollection<f32, Cpu>>(
     module: &mut M,
     prefix: &str,
     dropout: Option<f64>,
-    change: impl FnMut(&str, &[usize], &mut Vec<f32>) -> Result<(), NetworkError>,
+    change: &mut Change<'_>,
 ) -> Result<(), NetworkError> {
     M::iter_tensors(&mut RecursiveWalker {
         m: (module, prefix.to_owned()),
@@ -95,14 +95,19 @@ pub(super) fn collect<M: TensorCollection<f32, Cpu> + Clone>(
     prefix: &str,
     tensors: &mut Vec<NamedTensor>,
 ) {
-    change_each(&mut module.clone(), prefix, None, |name, shape, values| {
-        tensors.push(NamedTensor {
-            name: name.to_owned(),
-            shape: shape.to_vec(),
-            values: values.clone(),
-        });
-        Ok(())
-    })
+    change_each(
+        &mut module.clone(),
+        prefix,
+        None,
+        &mut |name, shape, values| {
+            tensors.push(NamedTensor {
+                name: name.to_owned(),
+                shape: shape.to_vec(),
+                values: values.clone(),
+            });
+            Ok(())
+        },
+    )
     .expect("collecting refuses nothing");
 }
 
@@ -118,7 +123,7 @@ pub(super) fn assign<'s, M: TensorCollection<f32, Cpu>>(
     architecture: &'static str,
     stored: &mut BTreeMap<&'s str, &'s NamedTensor>,
 ) -> Result<(), NetworkError> {
-    change_each(module, prefix, None, |name, expected, values| {
+    change_each(module, prefix, None, &mut |name, expected, values| {
         let refuse = |problem: String| Err(misfit(name, &problem));
         let Some(found) = stored.remove(name) else {
             return refuse(format!(
@@ -144,7 +149,7 @@ pub(super) fn set_dropout<M: TensorCollection<f32, Cpu>>(
     module: &mut M,
     probability: f64,
 ) -> Result<(), NetworkError> {
-    change_each(module, "", Some(probability), |_, _, _| Ok(()))
+    change_each(module, "", Some(probability), &mut |_, _, _| Ok(()))
 }
 
 /// Scales the first layer of `module`, whose weight takes `padded` inputs, as if it had been initialised for `inputs`.
@@ -158,7 +163,7 @@ pub(super) fn widen_first_layer<M: TensorCollection<f32, Cpu>>(
 ) -> Result<(), NetworkError> {
     let factor = (padded as f32 / inputs as f32).sqrt();
     let mut first_layer = None;
-    change_each(module, "", None, |name, shape, values| {
+    change_each(module, "", None, &mut |name, shape, values| {
         let (layer, field) = name.rsplit_once('.').unwrap_or(("", name));
         if first_layer.is_none() && field == "weight" && shape.last() == Some(&padded) {
             first_layer = Some(layer.to_owned());

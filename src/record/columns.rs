@@ -126,6 +126,14 @@ impl Columns {
                 ));
             }
         }
+        if let Some(at) = header.iter().position(|name| *name == "t")
+            && let Some(other) = names[at].as_ref().filter(|name| *name != "t")
+            && !names.iter().flatten().any(|name| name == "t")
+        {
+            return Err(format!(
+                "column t is to be {other}, and no other one is the time; give its column as t"
+            ));
+        }
         for letter in ["u", "y"].into_iter().filter(|l| *l == "u" || !lacks) {
             let given: Vec<&String> = (names.iter().flatten())
                 .filter(|name| name.starts_with(letter))
@@ -465,6 +473,7 @@ mod tests {
                 "no channel is called \"pumpp\" (did you mean \"pump\"?)",
             ),
             ("t=a,u=a", "a,b", "column \"a\" is to be both"),
+            ("y1=t", "t,u,y", "no other one is the time"),
             ("u=a,pump=b", "a,b", "two columns are to be u"),
             ("upper=a,y1=b", "a,b", "two columns are to be"),
             ("t=a", "a,a", "column \"a\" appears twice"),

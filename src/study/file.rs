@@ -281,18 +281,22 @@ fn value_of(file: &Spanned<DeTable<'_>>, table: &str, name: &str) -> Option<usiz
 }
 
 /// Returns how many lines below the first one of a table the key stands that a message is about, of which the parser tells the table alone:
-/// `k1: …` or ``… `blobs` …``.
+/// `k1: …` or ``… `blobs` …``, where also a value may stand so.
 fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
     let before_colon = message.split(": ").next().filter(|key| !key.contains(' '));
-    let Some(key) = before_colon.or_else(|| message.split('`').nth(1)) else {
-        return 0;
+    let told = before_colon
+        .into_iter()
+        .chain(message.split('`').skip(1).step_by(2));
+    let below = |key: &str| {
+        let mut of_table = (text.lines().skip(first)).take_while(|line| !line.starts_with('['));
+        of_table.position(|line| {
+            let (own, _) = line.split_once('=').unwrap_or_default();
+            own.trim().trim_matches(['"', '\'']) == key
+        })
     };
-    let mut of_table = (text.lines().skip(first)).take_while(|line| !line.starts_with('['));
-    let is_key = |line: &str| {
-        let (own, _) = line.split_once('=').unwrap_or_default();
-        own.trim().trim_matches(['"', '\'']) == key
-    };
-    of_table.position(is_key).map_or(0, |below| 1 + below)
+    told.into_iter()
+        .find_map(below)
+        .map_or(0, |below| 1 + below)
 }
 
 #[cfg(test)]
@@ -442,6 +446,14 @@ mod tests {
             ),
             ("twin = 'x'\n[record]\nsubsteps = 1e9\n", "s.toml, line 3"),
             ("twin = 'x'\n[record]\nsubsteps = -1\n", "s.toml, line 3"),
+            (
+                "twin = 'x'\n[features]\nkind = 'ar'\norder = -1\n",
+                "s.toml, line 4: invalid value",
+            ),
+            (
+                "twin = 'x'\n[features]\nkind = 'score'\nfilter = 3\n",
+                "expected a table of settings",
+            ),
             ("twin = 'x'\n[noise]\ny = 'guess'\n", "s.toml, line 3"),
             (
                 "twin = 'x'\n[noise]\nprocess = 'no'\n",

@@ -110,7 +110,8 @@ impl RecordPlan {
             Some("samples = 0; at least one is needed".into())
         } else if samples > MOST_SAMPLES {
             Some(format!(
-                "samples = {samples}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record"
+                "samples = {}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record",
+                number(samples as f64)
             ))
         } else if samples.saturating_mul(all) > MOST_NUMBERS {
             Some(format!(

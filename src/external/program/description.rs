@@ -70,10 +70,11 @@ impl Description {
     pub fn parse(line: &str) -> Result<Self, String> {
         let wrong = |error: serde_json::Error| message(&error.to_string());
         let OnceEach(shown) = serde_json::from_str(line).map_err(wrong)?;
-        if let Value::Object(shown) = &shown
-            && Inside::is_shown(shown)
-        {
-            return Self::with_inside(Inside::parse(shown)?);
+        if let Value::Object(shown) = &shown {
+            Inside::check_keys(shown)?;
+            if Inside::is_shown(shown) {
+                return Self::with_inside(Inside::parse(shown)?);
+            }
         }
         let Keyed::<Told>(told) = serde_json::from_str(line).map_err(wrong)?;
         name::check(&told.name).map_err(|problem| format!("name: {problem}"))?;
@@ -264,7 +265,12 @@ mod tests {
                 "{\"v\": 1}",
                 "the twin has no input \"v\" (did you mean \"u\"?)",
             ),
-            ("\"outputs\"", "\"outptus\"", "unknown key `outptus`"),
+            (
+                "\"outputs\"",
+                "\"outptus\"",
+                "(did you mean \"outputs\"?); there are name,",
+            ),
+            ("\"inputs\"", "\"defines\"", "(did you mean \"define\"?)"),
             ("\"name\": \"y\"", "\"name\": \"u\"", "duplicate name u"),
             ("\"name\": \"y\"", "\"name\": \"k\"", "duplicate name k"),
             ("\"name\": \"y\"", "\"name\": \"t\"", "which is the time"),

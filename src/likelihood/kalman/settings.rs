@@ -28,7 +28,11 @@ pub enum Method {
 /// | `start_covariance` | none | symmetric, ≥ 0 | covariance of the first state, in products of state units; none: the start is known |
 /// | `keep_states` | no | | keep filtered means and covariances in [`Filtered`](super::Filtered) |
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(
+    deny_unknown_fields,
+    default,
+    expecting = "a table of settings of the filter"
+)]
 pub struct FilterSettings {
     /// Method that carries moments through the equations.
     pub method: Method,

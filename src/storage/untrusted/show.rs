@@ -107,9 +107,6 @@ fn short_numbers(text: &str) -> String {
     let short = |word: &str| -> Option<String> {
         let digits = word.bytes().filter(u8::is_ascii_digit).count();
         let value: f64 = word.parse().ok().filter(|_| digits > 8)?;
-        // Counts are exact.
-        let is_count = digits == word.len() && value < 1e15;
-        let value = (!is_count).then_some(value)?;
         Some(number(six_digits(value)))
     };
     let mut all = String::with_capacity(text.len());

@@ -65,8 +65,9 @@ impl LeadIn {
         }
         if steps.is_nan() || steps > MOST_BEFORE {
             return Err(format!(
-                "the start belongs to {} s, {steps} steps before the first row at {} s; at most {MOST_BEFORE} are run: give a later time",
+                "the start belongs to {} s, {} steps before the first row at {} s; at most {MOST_BEFORE} are run: give a later time",
                 number(begun),
+                number(steps),
                 number(first_row)
             ));
         }

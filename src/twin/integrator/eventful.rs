@@ -1,6 +1,6 @@
 //! The way to the next sample of a twin with events.
 
-use super::path::{Path, Stretch, jumps};
+use super::path::{Path, Rates, Stretch, jumps};
 use super::schedule::{WayRules, limited};
 use super::watch::{EventCalls, EventWatch, EventsOfWay};
 use super::{Integrator, Now, Workspace};
@@ -27,11 +27,11 @@ impl Workspace {
         n: usize,
         now: &Now<'_>,
         x: &mut [f64],
-        drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
+        mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
         match calls.list.is_empty() {
             true => self.carry(n, now, x, drift),
-            false => self.carry_to_events(calls, n, now, x, drift),
+            false => self.carry_to_events(calls, n, now, x, &mut drift),
         }
     }
 
@@ -42,7 +42,7 @@ impl Workspace {
         n: usize,
         now: &Now<'_>,
         x: &mut [f64],
-        mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
+        drift: &mut Rates<'_>,
     ) {
         let (rule, stages) = (self.integrator, &mut self.stages);
         let Some(refined) = self.refined.as_mut().filter(|_| n > 0) else {
@@ -77,7 +77,7 @@ impl Workspace {
         let mut path = Path {
             now: &way,
             inputs: &mut refined.inputs,
-            drift: &mut drift,
+            drift,
             breaks: &breaks,
         };
         let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));

@@ -328,24 +328,34 @@ impl Workspace {
         x: &mut [f64],
         mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
-        let (rule, stages) = (self.integrator, &mut self.stages);
+        match self.refined {
+            None => self.integrator.step(now, x, &mut self.stages, drift),
+            Some(_) => self.carry_refined(n, now, x, &mut drift),
+        }
+    }
+
+    /// As [`carry`](Self::carry), not in one step of held inputs. One copy serves all equations: here a call costs little of a step.
+    fn carry_refined(&mut self, n: usize, now: &Now<'_>, x: &mut [f64], drift: &mut Rates<'_>) {
         let Some(refined) = &mut self.refined else {
-            return rule.step(now, x, stages, drift);
+            return;
         };
         if let Some(between) = now.between {
-            between.jump(now, x, &mut refined.inputs, &mut drift);
+            between.jump(now, x, &mut refined.inputs, drift);
         }
         match &mut self.schedule {
             Some(schedule) => {
                 let mut path = Path {
                     now,
                     inputs: &mut refined.inputs,
-                    drift: &mut drift,
+                    drift,
                     breaks: jumps(now),
                 };
                 schedule.carry(&mut path, x, &refined.limits);
             }
-            None => rule.substeps(n, now, x, (stages, refined), drift),
+            None => {
+                let rule = self.integrator;
+                rule.substeps(n, now, x, (&mut self.stages, refined), drift);
+            }
         }
     }
 
@@ -397,14 +407,13 @@ impl Integrator {
 
     /// Steps of Δt/m, inputs between this sample's and the next one's where there is one. States are put into their limits between substeps, as
     /// they would be between samples of a finer step.
-    #[inline(never)]
     fn substeps(
         self,
         n: usize,
         now: &Now<'_>,
         x: &mut [f64],
         (work, refined): (&mut StepBuffers, &mut Refined),
-        mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
+        drift: &mut Rates<'_>,
     ) {
         let m = refined.substeps;
         let h = now.dt / m as f64;
@@ -422,7 +431,7 @@ impl Integrator {
                 ..*now
             };
             let Some(between) = now.between else {
-                self.step(&sub, x, work, &mut drift);
+                self.step(&sub, x, work, &mut *drift);
                 continue;
             };
             let inputs = &mut refined.inputs;
