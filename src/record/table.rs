@@ -123,7 +123,10 @@ impl Table {
             }
             *read += width;
             if *read > MOST_NUMBERS {
-                let problem = format!("more than {MOST_NUMBERS} numbers in all records together");
+                let problem = format!(
+                    "more than {} numbers in all records together",
+                    number(MOST_NUMBERS as f64)
+                );
                 return Err(large(problem));
             }
             let number = reader.line();

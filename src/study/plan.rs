@@ -115,7 +115,8 @@ impl RecordPlan {
             ))
         } else if samples.saturating_mul(all) > MOST_NUMBERS {
             Some(format!(
-                "samples = {samples} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record"
+                "samples = {samples} for {all} inputs and outputs; at most {} numbers can be simulated: take a shorter record",
+                number(MOST_NUMBERS as f64)
             ))
         } else if self.step * samples as f64 > LARGEST {
             Some(format!(

@@ -11,7 +11,7 @@ use super::Draws;
 pub(crate) use super::npy::archive;
 use super::npy::{self, Npz};
 use crate::estimator::error::EstimatorError;
-use crate::setting::count;
+use crate::setting::{count, number};
 use crate::storage::files::write_new;
 use crate::storage::reading::{Reading, note_whole, open};
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt};
@@ -219,7 +219,8 @@ fn rows_of_csv(file: impl Read, space: &ParameterSpace) -> Result<Draws, String>
         let line = csv.line();
         if (rows + 1) * (d + n) > MOST_NUMBERS {
             return Err(format!(
-                "more than {MOST_NUMBERS} numbers; keep such a bank in shards"
+                "more than {} numbers; keep such a bank in shards",
+                number(MOST_NUMBERS as f64)
             ));
         }
         for (column, cell) in cells.iter().enumerate() {

@@ -5,6 +5,7 @@
 //!
 //! Source: NumPy Enhancement Proposal 1, "A simple file format for NumPy arrays".
 
+use crate::setting;
 use crate::storage::untrusted::{MOST_NUMBERS, message};
 use ndarray::{Array2, Ix2, Shape, ShapeBuilder};
 use std::io::{self, Cursor, Read, Seek, Write};
@@ -125,7 +126,8 @@ impl ArrayHeader {
         };
         match rows.checked_mul(columns) {
             Some(numbers) if numbers > MOST_NUMBERS as u64 => Err(format!(
-                "its shape ({shape}) has more than {MOST_NUMBERS} numbers; keep such a bank in shards"
+                "its shape ({shape}) has more than {} numbers; keep such a bank in shards",
+                setting::number(MOST_NUMBERS as f64)
             )),
             Some(numbers) if numbers * width as u64 == rest => {
                 let shape = (rows as usize, columns as usize).set_f(by_columns);

@@ -18,8 +18,8 @@ use super::reading::Reading;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Most numbers that one file may hold, 4 GiB of them: what is larger is kept in shards, or in several records.
-pub(crate) const MOST_NUMBERS: usize = 1 << 29;
+/// Most numbers that one file may hold, 4 GB of them: what is larger is kept in shards, or in several records.
+pub(crate) const MOST_NUMBERS: usize = 500_000_000;
 
 /// The bytes of a file, `most` of them; a longer one is refused, also one that has no end.
 pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {

@@ -200,7 +200,7 @@ mod tests {
             "0".repeat(300)
         );
         assert_eq!(message(&long), "found `1e308`, 1e-301 in a_123456789");
-        assert_eq!(message("536870912 of 0.25"), "536870912 of 0.25");
+        assert_eq!(message("98765432 of 100000000"), "98765432 of 1e8");
         assert_eq!(quoted("t\u{feff}1\u{a0}0"), "t\\u{feff}1\\u{a0}0");
         let key = message(&format!(
             "unknown field `{}`, expected `a`",

@@ -495,7 +495,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
     );
     check(
         "twin = 'tanks'\n[record]\nsamples = 100000000000\n",
-        &["samples = 100000000000"],
+        &["samples = 1e11"],
     );
     check("twin = 'tanks'\n[record]\nstep = 0\n", &["step = 0 s"]);
     check(
