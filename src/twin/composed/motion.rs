@@ -2,9 +2,9 @@
 
 use super::parts::Theta;
 use super::{Composed, Entry, Law, TwinPart};
-use crate::math::{LANES, Lanes, Number};
+use crate::math::{LANES, Lanes};
 use crate::twin::points::{
-    Layout, Points, advance_together, lanes_one_by_one, noise_lanes, observe_lanes, readout_lanes,
+    Layout, Points, advance_together, lanes_one_by_one, observe_lanes, readout_lanes,
 };
 use crate::twin::{EventCalls, Now, Workspace};
 
@@ -225,34 +225,6 @@ impl Composed {
         observe_lanes(n, now, x, y, buffer, observe);
     }
 
-    /// Noise levels of the states `x`, four at most, and the output of several filters, one a lane.
-    pub(crate) fn noise_lanes(
-        &self,
-        now: &[Now<'_>],
-        x: &[Lanes],
-        process: &mut [Lanes],
-        measurement: &mut Lanes,
-    ) {
-        if self.parts.acts.leave_motion() && !self.parts.acts.on_noise {
-            self.lanes_in_step(now, self.parts.noise_step, |now| {
-                self.own.noise_lanes(now, x, process, measurement);
-            });
-            let at = |lane: usize| now.get(lane).unwrap_or(&now[0]);
-            for added in &self.parts.list {
-                if let TwinPart::Levels(levels) = &added.part {
-                    let dt = Lanes::of_lanes(|lane| added.step.unwrap_or(at(lane).dt));
-                    let theta = |entry: usize| Lanes::of_lanes(|lane| at(lane).theta[entry]);
-                    levels.set(dt, theta, process, std::slice::from_mut(measurement));
-                }
-            }
-            return;
-        }
-        let noise = |now: &Now<'_>, x: &[f64], q: &mut [f64], r: &mut [f64]| {
-            self.noise(now, x, q, r);
-        };
-        noise_lanes(process.len(), now, x, (process, measurement), noise);
-    }
-
     /// Puts values of one output of several filters, one a lane, through the readout; returns the lanes that it changed.
     pub(crate) fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES] {
         if self.parts.leave_readings() {
@@ -269,7 +241,7 @@ impl Composed {
 
     /// The same with another step, where one is given.
     #[inline]
-    fn lanes_in_step<R>(
+    pub(super) fn lanes_in_step<R>(
         &self,
         now: &[Now<'_>],
         step: Option<f64>,

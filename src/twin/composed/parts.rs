@@ -67,6 +67,8 @@ pub(in crate::twin) struct Acts {
     pub on_noise: bool,
     /// `true` where noise levels are fitted.
     pub in_levels: bool,
+    /// `true` where noise grows with its signal.
+    pub in_proportion: bool,
     pub on_start: bool,
     /// `true` where sensors remember.
     pub in_sensors: bool,
@@ -86,7 +88,8 @@ impl Acts {
             TwinPart::Unit(_) => {
                 (self.on_outputs, self.on_noise, self.on_readings) = (true, true, true);
             }
-            TwinPart::Level { .. } | TwinPart::Share { .. } => self.on_noise = true,
+            TwinPart::Level { .. } => self.on_noise = true,
+            TwinPart::Share { .. } => (self.on_noise, self.in_proportion) = (true, true),
             TwinPart::Levels(_) => self.in_levels = true,
             TwinPart::Start { .. } | TwinPart::UncertainStart { .. } => self.on_start = true,
             TwinPart::Disturbance(part) => {
@@ -321,6 +324,11 @@ impl Parts {
             TwinPart::Disturbance(part) => Some((added, part, added.states.start)),
             _ => None,
         })
+    }
+
+    /// Returns whether the twin's own clock is late.
+    pub fn is_late(&self) -> bool {
+        !self.delays.is_empty()
     }
 
     /// Returns the delay of this index in seconds.
