@@ -59,8 +59,9 @@ impl Catalogue {
                 problem: message(&lines.join(", ")),
             }
         };
-        if let Ok(table) = toml::from_str(text) {
-            check_names(&table).map_err(|problem| wrong(1, &problem))?;
+        if let Ok(table) = DeTable::parse(text) {
+            check_names(table.get_ref())
+                .map_err(|(byte, problem)| wrong(line(text, byte), &problem))?;
         }
         let file: EffectFile = toml::from_str(text).map_err(|error| {
             let byte = error.span().map_or(0, |span| span.start);

@@ -3,7 +3,7 @@
 use super::declared::{Declared, NoiseValue, StartValue};
 use super::entries::{TableEntry, entries};
 use super::error::EquationsError;
-use super::event::{EVENT, EventText, events};
+use super::event::{EventText, events};
 use super::graph::{Graph, Id, Varies};
 use super::names::{Meaning, Scope};
 use super::place::{SourceText, number};
@@ -77,17 +77,6 @@ pub(crate) fn take(
     text: &str,
     file: &mut DeTable<'_>,
 ) -> Result<Option<Equations>, EquationsError> {
-    if let Some((key, table)) = file
-        .keys()
-        .find_map(|key| Some((key, meant(key.get_ref())?)))
-    {
-        let written = match table {
-            EVENT => "[[event]]".to_owned(),
-            table => format!("[{table}]"),
-        };
-        let problem = format!("[{}] is no table of a twin; write {written}", key.get_ref());
-        return SourceText(text).error(key.span().start, problem);
-    }
     let given = |table: &&str| file.get(*table).is_some();
     let Some(first) = TABLES[1..].iter().find(|table| given(table)) else {
         return Ok(None);
@@ -105,14 +94,6 @@ pub(crate) fn take(
     let name = DeValue::String(equations.name().to_owned().into());
     file.insert(Spanned::new(0..0, "twin".into()), Spanned::new(0..0, name));
     Ok(Some(equations))
-}
-
-/// The table whose name was written in the singular, or in the plural.
-fn meant(name: &str) -> Option<&'static str> {
-    let is_meant = |table: &&&str| {
-        table.strip_suffix('s') == Some(name) || name.strip_suffix('s') == Some(**table)
-    };
-    TABLES.iter().find(is_meant).copied()
 }
 
 /// Values of one state.

@@ -26,7 +26,6 @@ struct Definition {
     name: String,
     byte: usize,
     placed: PlacedExpression,
-    is_constant: bool,
 }
 
 /// Scope and the graph that expressions become a part of.
@@ -34,6 +33,8 @@ pub(super) struct Scope<'t> {
     source: SourceText<'t>,
     meanings: HashMap<String, (Meaning, &'static str)>,
     definitions: Vec<Definition>,
+    /// `true` for definitions that are constants.
+    constants: Vec<bool>,
     /// Values of definitions.
     defined: Vec<Option<Id>>,
     pub graph: Graph,
@@ -45,6 +46,7 @@ impl<'t> Scope<'t> {
             source,
             meanings: HashMap::new(),
             definitions: vec![],
+            constants: vec![],
             defined: vec![],
             graph: Graph::default(),
         }
@@ -75,11 +77,11 @@ impl<'t> Scope<'t> {
         is_constant: bool,
     ) -> Result<(), EquationsError> {
         self.add(entry, Meaning::Defined(self.definitions.len()))?;
+        self.constants.push(is_constant);
         self.definitions.push(Definition {
             name: entry.name.into(),
             byte: entry.byte,
             placed,
-            is_constant,
         });
         Ok(())
     }
@@ -108,16 +110,14 @@ impl<'t> Scope<'t> {
             }
             for index in ready {
                 let definition = &definitions[index];
-                let id = self.value(&definition.placed)?;
-                if definition.is_constant && self.graph.get(id).1 != Varies::Never {
-                    return self.source.error(
-                        definition.placed.byte(0),
-                        format!(
-                            "{} is no constant; make it a definition",
-                            excerpt(&definition.name)
-                        ),
-                    );
-                }
+                let id = match self.constants[index] {
+                    true => {
+                        let name = excerpt(&definition.name);
+                        let problem = format!("{name} is no constant; make it a definition");
+                        self.value_within(&definition.placed, Varies::Never, &problem)?
+                    }
+                    false => self.value(&definition.placed)?,
+                };
                 self.defined[index] = Some(id);
             }
             waiting = blocked;
@@ -260,10 +260,14 @@ impl<'t> Scope<'t> {
             Meaning::Parameter(_) => Varies::ByParameters <= most,
             Meaning::Input(_) => Varies::ByStep <= most,
             Meaning::State(_) => Varies::ByState <= most,
-            // One that waits for others may depend on anything.
+            // A definition that waits for others may depend on anything.
             Meaning::Defined(index) => {
                 let varies = self.defined[*index].map(|id| self.graph.get(id).1);
-                varies.unwrap_or(Varies::ByState) <= most
+                let waits = match self.constants[*index] {
+                    true => Varies::Never,
+                    false => Varies::ByState,
+                };
+                varies.unwrap_or(waits) <= most
             }
             Meaning::Output => false,
         };

@@ -169,6 +169,14 @@ fn faults_are_one_line_with_their_place() {
             "g is no constant",
         ),
         (
+            "[constants]\ng = \"kk\"\nh0 = 1\n[states]\nh = { rate = \"g\" }\n",
+            "unknown name \"kk\"; there are h0, pi",
+        ),
+        (
+            "[states]\nh = { rate = \"if(h => 1, 0, 1)\" }\n",
+            "=>; write >= to compare",
+        ),
+        (
             "[states]\nh = { rate = \"1\", next = \"2\" }\n",
             "h has rate and next",
         ),

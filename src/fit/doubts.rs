@@ -69,7 +69,7 @@ const REMEDIES: [(&str, &str); 21] = [
     ),
     (
         NOT_CONVERGED,
-        "narrow the priors, or fix a parameter that the record does not identify",
+        "narrow the priors, or fix a parameter, a start or a noise level that the record does not identify",
     ),
     (
         "process-noise",

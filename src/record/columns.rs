@@ -92,7 +92,8 @@ impl Columns {
         let mut names: Vec<Option<String>> = vec![None; header.len()];
         let lacks = signals.is_some_and(|signals| signals.outputs.len() > 1);
         for (key, column) in &self.0 {
-            let usual = usual_name(key, signals).ok_or_else(|| unknown_key(key, signals))?;
+            let known = usual_name(key, signals).filter(|name| is_of(name, signals));
+            let usual = known.ok_or_else(|| unknown_key(key, signals))?;
             let at = (header.iter()).position(|name| name == column);
             let has_other = |key: &String| {
                 let is_output = |key| usual_name(key, signals).is_some_and(|n| n.starts_with('y'));
@@ -314,6 +315,19 @@ fn ambiguous(header: &[&str], names: &[Option<String>], signals: &Signals) -> Op
 }
 
 /// The error of a name that is not the twin's.
+/// Returns whether the twin has a channel of this usual name, as far as it is known.
+fn is_of(usual: &str, signals: Option<&Signals>) -> bool {
+    let Some(signals) = signals else {
+        return true;
+    };
+    let number = usual[1..].parse().unwrap_or(1);
+    match usual.as_bytes()[0] {
+        b'u' => number <= signals.inputs.len(),
+        b'y' => number <= signals.outputs.len(),
+        _ => true,
+    }
+}
+
 fn unknown_key(key: &str, signals: Option<&Signals>) -> String {
     let own = signals.map(|s| s.inputs.iter().chain(&s.outputs));
     let mut known = vec!["t"];
@@ -474,6 +488,7 @@ mod tests {
             ),
             ("t=a,u=a", "a,b", "column \"a\" is to be both"),
             ("y1=t", "t,u,y", "no other one is the time"),
+            ("y3=y", "t,u,y", "no channel is called \"y3\""),
             ("u=a,pump=b", "a,b", "two columns are to be u"),
             ("upper=a,y1=b", "a,b", "two columns are to be"),
             ("t=a", "a,a", "column \"a\" appears twice"),

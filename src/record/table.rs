@@ -244,8 +244,8 @@ impl CellParser {
                 self.has_seconds = true;
                 self.number(cell, row)
                     .map_err(|problem| match Stamp::is_meant(cell) {
-                        true => not_a_stamp(cell),
-                        false => problem,
+                        true if cell.parse::<f64>().is_err() => not_a_stamp(cell),
+                        _ => problem,
                     })
             }
         }

@@ -4,8 +4,8 @@ use super::{Library, RecordPlan, RecordTable, Study, StudyError, StudyFile};
 use crate::effect::{Effect, EffectKey, augment};
 use crate::setting::number;
 use crate::twin::{
-    Adaptation, Hold, Integrator, MOST_SUBSTEPS, NoiseLevel, Role, Stepping, TOLERANCES, Twin,
-    TwinError, adapt, fix,
+    Adaptation, Integrator, MOST_SUBSTEPS, NoiseLevel, Role, Stepping, TOLERANCES, Twin, TwinError,
+    adapt, fix,
 };
 use std::collections::BTreeMap;
 
@@ -137,12 +137,6 @@ impl Study {
                 "substeps = {n}; choose between 1 and {MOST_SUBSTEPS}"
             )));
         }
-        if hold == Some(Hold::Impulse) {
-            return Err(StudyError::Plan(
-                "hold = \"impulse\" is of a single input; say so where the input is declared"
-                    .into(),
-            ));
-        }
         if let Some(tolerance) = tolerance.filter(|share| !TOLERANCES.contains(share)) {
             return Err(StudyError::Plan(format!(
                 "tolerance = {}; choose a share between {:e} and {}",
@@ -224,6 +218,7 @@ fn augmented(twin: &Twin, effects: &[Effect]) -> Result<Twin, (usize, TwinError)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::twin::Hold;
     use crate::twin::fixture::AtOnce;
     use crate::twins::CascadedTanks;
 

@@ -9,7 +9,9 @@ use crate::storage::untrusted::{all_keyed, check_names, line, message, read_text
 use crate::study::error::StudyError;
 use crate::study::noise_table::NoiseTable;
 use crate::study::plan::grid_of_files;
-use crate::study::tables::{Library, PriorTable, RecordTable, check_shapes, check_tables, dotted};
+use crate::study::tables::{
+    Library, PriorTable, RecordTable, check_features, check_shapes, check_tables, dotted,
+};
 use crate::twin::{Interval, StartLevel, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -161,18 +163,16 @@ impl StudyFile {
             )
         };
         let mut table = DeTable::parse(text).map_err(syntax)?;
-        check_shapes(table.get_ref())
-            .map_err(|(start, problem)| wrong(line(text, start), &problem))?;
+        let at = |(start, problem): (usize, String)| wrong(line(text, start), &problem);
+        check_tables(table.get_ref()).map_err(at)?;
+        check_shapes(table.get_ref()).map_err(at)?;
         let equations =
             equations::take(text, table.get_mut()).map_err(|error| error.in_file(path))?;
-        check_tables(table.get_ref())
-            .map_err(|(start, problem)| wrong(line(text, start), &problem))?;
-        let mut rest: toml::Table = toml::from_str(text).map_err(syntax)?;
-        if equations.is_some() {
-            rest.retain(|key, _| !equations::TABLES.contains(&key));
+        check_names(table.get_ref()).map_err(at)?;
+        if let Some(features) = table.get_ref().get("features") {
+            check_features(features).map_err(at)?;
         }
-        check_names(&rest).map_err(|problem| wrong(1, &problem))?;
-        if equations.is_none() && !rest.contains_key("twin") {
+        if !table.get_ref().contains_key("twin") {
             return Err(StudyError::NoTwin(path.into()));
         }
         let mut file = Self::deserialize(toml::de::Deserializer::from(table)).map_err(syntax)?;
@@ -280,23 +280,22 @@ fn value_of(file: &Spanned<DeTable<'_>>, table: &str, name: &str) -> Option<usiz
     value.or_else(listed).map(|value| value.span().start)
 }
 
-/// Returns how many lines below the first one of a table the key stands that a message is about, of which the parser tells the table alone:
-/// `k1: …` or ``… `blobs` …``, where also a value may stand so.
+/// Returns how many lines below the line `first`, that of a table's header or of a key, the key stands that a message is about, of which the
+/// parser may tell the table alone: `k1: …` or ``… `blobs` …``, where also a value may stand so.
 fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
     let before_colon = message.split(": ").next().filter(|key| !key.contains(' '));
-    let told = before_colon
-        .into_iter()
-        .chain(message.split('`').skip(1).step_by(2));
+    let quoted = message.split('`').skip(1).step_by(2);
+    let lines = || text.lines().skip(first - 1).enumerate();
     let below = |key: &str| {
-        let mut of_table = (text.lines().skip(first)).take_while(|line| !line.starts_with('['));
-        of_table.position(|line| {
+        let mut of_table = lines().take_while(|(i, line)| *i == 0 || !line.starts_with('['));
+        let is_key = |(_, line): &(usize, &str)| {
             let (own, _) = line.split_once('=').unwrap_or_default();
             own.trim().trim_matches(['"', '\'']) == key
-        })
+        };
+        of_table.find(is_key).map(|(below, _)| below)
     };
-    told.into_iter()
-        .find_map(below)
-        .map_or(0, |below| 1 + below)
+    let mut told = before_colon.into_iter().chain(quoted);
+    told.find_map(below).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -412,7 +411,7 @@ mod tests {
             ),
             (
                 "[states]\nh = { rate = '1' }\n[[events]]\nat = 1\n",
-                "[events] is no table of a twin; write [[event]]",
+                "line 3: unknown key `events` (did you mean \"event\"?)",
             ),
             (
                 "twin = 'tanks'\n[prior]\nk1 = [0.8, 0.4]\n",
@@ -422,7 +421,7 @@ mod tests {
             ("twin = \n", "s.toml, line 1"),
             (
                 "twin = 'x'\n[record]\nhold = 'cubic'\n",
-                "s.toml, line 3: unknown value `cubic`, expected one of `zero`, `linear`, `nearest`, `spline`",
+                "s.toml, line 3: unknown value `cubic`, expected one of `zero`, `linear`, `spline`, `nearest`",
             ),
             (
                 "twin = 'x'\n[record.input]\nu1 = 1\nu2 = { levels = [2, 1], hold = 3 }\n",
@@ -452,7 +451,35 @@ mod tests {
             ),
             (
                 "twin = 'x'\n[features]\nkind = 'score'\nfilter = 3\n",
-                "expected a table of settings",
+                "s.toml, line 4: filter: found integer `3`, expected a table of settings",
+            ),
+            (
+                "twin = 'x'\n[features]\nkind = 'arx'\noutputs = 8\ninputs = '8'\n",
+                "s.toml, line 5: inputs: found string",
+            ),
+            (
+                "twin = 'x'\n[features]\nkin = 'arx'\noutputs = 8\n",
+                "s.toml, line 3: unknown key `kin` (did you mean \"kind\"?)",
+            ),
+            (
+                "twin = 'x'\n[features]\nkind = 'arx'\noutputs = 8\n",
+                "s.toml, line 2: missing key `inputs`",
+            ),
+            (
+                "twin = 'x'\n[record]\nstepp = 0.5\nsamples = 60\nhold = 'zero'\n",
+                "s.toml, line 3: unknown key `stepp`",
+            ),
+            (
+                "twin = 'x'\n[record]\nhold = 'impulse'\n",
+                "hold = \"impulse\" is of a single input",
+            ),
+            (
+                "twin = 'x'\n[fixed]\nk4 = 1.0\n[library]\nwithout = ['sensor-lag\u{200b}']\n",
+                "s.toml, line 5: \"sensor-lag\" holds the hidden character",
+            ),
+            (
+                "[constnts]\ng = 1\n[states]\nh = { rate = 'g' }\n[outputs]\ny = { value = 'h' }\n",
+                "s.toml, line 1: unknown key `constnts` (did you mean \"constants\"?)",
             ),
             ("twin = 'x'\n[noise]\ny = 'guess'\n", "s.toml, line 3"),
             (

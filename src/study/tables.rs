@@ -2,6 +2,7 @@
 
 use crate::effect::{Effect, EffectKey, EffectPattern};
 use crate::equations;
+use crate::feature::FeatureRecipe;
 use crate::record::Columns;
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::excerpt;
@@ -10,6 +11,8 @@ use crate::twin::{Hold, Integrator, Interval};
 use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// `[record]`.
@@ -27,6 +30,7 @@ pub struct RecordTable {
     /// Inputs.
     pub input: Option<PlannedInputs>,
     /// Inputs between samples, also of measured records.
+    #[serde(deserialize_with = "hold_of_all")]
     pub hold: Option<Hold>,
     /// Integrator of the twin, also for measured records.
     pub integrator: Option<Integrator>,
@@ -37,6 +41,23 @@ pub struct RecordTable {
     /// Columns of measured records that do not have the usual names.
     #[serde(skip_serializing_if = "Columns::is_empty")]
     pub columns: Columns,
+}
+
+/// Reads a rule that may be that of all inputs.
+fn hold_of_all<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Hold>, D::Error> {
+    let Some(name) = Option::<String>::deserialize(from)? else {
+        return Ok(None);
+    };
+    match Hold::NAMES.iter().find(|(_, own)| *own == name) {
+        Some((Hold::Impulse, _)) => Err(D::Error::custom(
+            "hold = \"impulse\" is of a single input; say so where the input is declared",
+        )),
+        Some((hold, _)) => Ok(Some(*hold)),
+        None => Err(D::Error::unknown_variant(
+            &name,
+            &["zero", "linear", "spline", "nearest"],
+        )),
+    }
 }
 
 impl RecordTable {
@@ -186,6 +207,56 @@ pub(super) fn check_tables(file: &DeTable<'_>) -> Result<(), (usize, String)> {
     }
     Ok(())
 }
+
+/// Checks features, of whose keys the parser does not tell the place: that key is at fault without which the error is another.
+pub(super) fn check_features(table: &Spanned<DeValue<'_>>) -> Result<(), (usize, String)> {
+    let DeValue::Table(keys) = table.get_ref() else {
+        return Ok(());
+    };
+    let Some(told) = features_error(keys.clone()) else {
+        return Ok(());
+    };
+    let is_meant = |name: &str| match keys.contains_key(KIND) {
+        false => !did_you_mean(name, [KIND]).is_empty(),
+        // What is missing stands nowhere.
+        true if told.starts_with("missing") => false,
+        true => {
+            let mut others = keys.clone();
+            others.remove(name);
+            features_error(others).as_ref() != Some(&told)
+        }
+    };
+    // Nothing can be read without the kind.
+    let (mut names, mut kind) = (vec![], vec![]);
+    for key in keys.keys() {
+        match key.get_ref().as_ref() {
+            KIND => kind.push(key),
+            _ => names.push(key),
+        }
+    }
+    names.append(&mut kind);
+    let Some(key) = names.into_iter().find(|key| is_meant(key.get_ref())) else {
+        return Err((table.span().start, told));
+    };
+    let name: &str = key.get_ref();
+    let problem = match keys.contains_key(KIND) {
+        false => format!("unknown key `{name}`{}", did_you_mean(name, [KIND])),
+        true if told.contains(&format!("`{name}`")) => told,
+        true => format!("{name}: {told}"),
+    };
+    Err((key.span().start, problem))
+}
+
+/// Returns why these keys are no features.
+fn features_error(keys: DeTable<'_>) -> Option<String> {
+    let keys = toml::de::Deserializer::from(Spanned::new(0..0, keys));
+    let read = toml::Table::deserialize(keys)
+        .and_then(|keys| <Arc<dyn FeatureRecipe>>::deserialize(toml::Value::Table(keys)));
+    Some(read.err()?.message().to_owned())
+}
+
+/// Key that says which features they are.
+const KIND: &str = "kind";
 
 /// Tables of a study file.
 const TABLES: [&str; 9] = [

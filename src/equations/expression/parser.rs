@@ -129,7 +129,12 @@ impl<'t> Parser<'t> {
         loop {
             let (at, token) = self.tokens[0];
             if token == Token::Sign("=") {
-                return Err((at, "a single =; write == to compare".into()));
+                let meant = match self.tokens.get(1) {
+                    Some((_, Token::Sign(">"))) => "=>; write >= to compare",
+                    Some((_, Token::Sign("<"))) => "=<; write <= to compare",
+                    _ => "a single =; write == to compare",
+                };
+                return Err((at, meant.into()));
             }
             let Some((operation, left, right, is_exchanged)) = between(token) else {
                 break;

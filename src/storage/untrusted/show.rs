@@ -3,6 +3,8 @@
 use crate::math::six_digits;
 use crate::setting::number;
 use std::borrow::Cow;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 /// Longest piece that a message quotes, in characters.
 const QUOTED: usize = 160;
@@ -144,20 +146,20 @@ pub(crate) fn one_line(text: &str, most: usize) -> String {
     line
 }
 
-/// Checks whether every key and text of a TOML table can be shown as a name; else what cannot.
-pub(crate) fn check_names(table: &toml::Table) -> Result<(), String> {
+/// Checks whether every key and text of a TOML table can be shown as a name; else the byte where one stands that cannot, and the problem.
+pub(crate) fn check_names(table: &DeTable<'_>) -> Result<(), (usize, String)> {
     table.iter().try_for_each(|(key, value)| {
-        check_name(key)?;
+        check_name(key.get_ref()).map_err(|problem| (key.span().start, problem))?;
         check_value(value)
     })
 }
 
 /// No deeper than the parser lets tables be nested.
-fn check_value(value: &toml::Value) -> Result<(), String> {
-    match value {
-        toml::Value::String(text) => check_name(text),
-        toml::Value::Array(values) => values.iter().try_for_each(check_value),
-        toml::Value::Table(table) => check_names(table),
+fn check_value(value: &Spanned<DeValue<'_>>) -> Result<(), (usize, String)> {
+    match value.get_ref() {
+        DeValue::String(text) => check_name(text).map_err(|problem| (value.span().start, problem)),
+        DeValue::Array(values) => values.iter().try_for_each(check_value),
+        DeValue::Table(table) => check_names(table),
         _ => Ok(()),
     }
 }
@@ -225,21 +227,21 @@ mod tests {
 
     #[test]
     fn names_that_cannot_be_shown_are_found_wherever_they_stand() {
-        let check = |text: &str| check_names(&toml::from_str(text).unwrap());
+        let check = |text: &str| check_names(DeTable::parse(text).unwrap().get_ref());
         assert_eq!(check("a = 1\n[b]\n\"µ.c\" = ['x y', 2.0]"), Ok(()));
         for bad in [
             "\"a\\u001B\" = 1",
             "a = [[{ b = \"\\n\" }]]",
             "a.\"\\u202E\".b = 1",
         ] {
-            let problem = check(bad).unwrap_err();
+            let (_, problem) = check(bad).unwrap_err();
             assert!(
                 problem.contains("hidden") && !problem.contains(hidden),
                 "{problem}"
             );
         }
         let long = format!("{} = 1", "a".repeat(1001));
-        assert!(check(&long).unwrap_err().contains("more than 1000"));
+        assert!(check(&long).unwrap_err().1.contains("more than 1000"));
     }
 
     #[test]

@@ -102,7 +102,7 @@ impl NoiseLevel {
             share,
             factor,
             known,
-            ..
+            per,
         }) = self
         else {
             return Ok(());
@@ -124,6 +124,11 @@ impl NoiseLevel {
             let remedy =
                 "a share is that of an output's noise in its signal; give a state std alone";
             return Err(wrong(".share", share, remedy));
+        }
+        if !is_process && per == Per::Second {
+            let remedy =
+                "per is of states, whose noise adds up over time; give an output std alone";
+            return Err(wrong("", std, remedy));
         }
         if !(factor > 1.0 && factor.is_finite()) {
             let remedy = "factor is how many times larger or smaller the level may well be: above 1, such as 2";
@@ -339,5 +344,11 @@ mod tests {
             let error = level.check("h1", true).unwrap_err().to_string();
             assert!(error.contains(value), "{error}");
         }
+        let text = "h = { std = 0.1, per = \"second\" }";
+        let per_second =
+            toml::from_str::<std::collections::BTreeMap<String, NoiseLevel>>(text).unwrap()["h"];
+        assert!(per_second.check("h", true).is_ok());
+        let error = per_second.check("y", false).unwrap_err().to_string();
+        assert!(error.contains("give an output std alone"), "{error}");
     }
 }
