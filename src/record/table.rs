@@ -75,13 +75,11 @@ impl Table {
             let remedy = "cut the record into shorter ones, or resample it";
             RecordError::file(path, format!("{problem}; {remedy}"))
         };
-        if header.len() > MOST_COLUMNS {
-            let given = header.len();
-            return Err(large(format!(
-                "{given} columns, at most {MOST_COLUMNS} are read"
-            )));
-        }
         let header: Vec<&str> = header.iter().collect();
+        if header.len() > MOST_COLUMNS {
+            let problem = format!("{} columns, at most {MOST_COLUMNS} are read", header.len());
+            return Err(large(problem));
+        }
         if wanted.is_usual() {
             check_header(&header, reader.line(), path)?;
         }
@@ -123,11 +121,8 @@ impl Table {
             }
             *read += width;
             if *read > MOST_NUMBERS {
-                let problem = format!(
-                    "more than {} numbers in all records together",
-                    number(MOST_NUMBERS as f64)
-                );
-                return Err(large(problem));
+                let most = number(MOST_NUMBERS as f64);
+                return Err(large(format!("more than {most} numbers in all records")));
             }
             let number = reader.line();
             let lines = number.saturating_sub(t.len() + 2);

@@ -1,7 +1,7 @@
 //! Noise levels and starts: of composed equations, from outside a twin, from a record.
 
 use super::{Composed, Disturbance, FittedLevels, Law, LevelSource, LevelValue, TwinPart};
-use crate::math::{Lanes, Number};
+use crate::math::{Condition, Lanes, Number};
 use crate::twin::Now;
 use crate::twin::points::noise_lanes;
 use smallvec::SmallVec;
@@ -92,7 +92,7 @@ impl Composed {
                     let value = of(&|now| level.value(now.theta));
                     match is_process {
                         // Variances add up over time: another step is not another physics.
-                        true => process[*target] = value * (dt() / N::all(*step)).sqrt(),
+                        true => process[*target] = of_step(value, dt(), *step),
                         false => measurement[*target] = value,
                     }
                 }
@@ -116,6 +116,16 @@ impl Composed {
     }
 }
 
+/// Returns the level of an increment in `dt` seconds that is `level` in `step`.
+fn of_step<N: Number>(level: N, dt: N, step: f64) -> N {
+    let step = N::all(step);
+    // Roots of eight numbers a row cost a tenth of a filter.
+    match (dt.below(step) | step.below(dt)).any() {
+        true => level * (dt / step).sqrt(),
+        false => level,
+    }
+}
+
 /// Joins a standard deviation to a level.
 fn join<N: Number>(level: &mut N, added: N) {
     let both = |(level, added): (f64, f64)| match added {
@@ -135,15 +145,14 @@ impl FittedLevels {
         process: &mut [N],
         measurement: &mut [N],
     ) {
-        let (per_step, per_second) = ((dt / N::all(self.step)).sqrt(), dt.sqrt());
         for (level, source) in process.iter_mut().zip(&self.process) {
             *level = match *source {
-                LevelSource::Declared => *level * per_step,
+                LevelSource::Declared => of_step(*level, dt, self.step),
                 LevelSource::Fitted { entry, declared } if declared > 0.0 => {
-                    *level * per_step * (theta(entry) / N::all(declared))
+                    of_step(*level, dt, self.step) * (theta(entry) / N::all(declared))
                 }
-                LevelSource::Fitted { entry, .. } => theta(entry) * per_second,
-                LevelSource::Follows { entry, share } => theta(entry) * share * per_second,
+                LevelSource::Fitted { entry, .. } => theta(entry) * dt.sqrt(),
+                LevelSource::Follows { entry, share } => theta(entry) * share * dt.sqrt(),
             };
         }
         for (level, source) in measurement.iter_mut().zip(&self.measurement) {
