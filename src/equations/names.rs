@@ -110,7 +110,7 @@ impl<'t> Scope<'t> {
             }
             for index in ready {
                 let definition = &definitions[index];
-                let id = match self.constants[index] {
+                let id = match std::mem::take(&mut self.constants[index]) {
                     true => {
                         let name = excerpt(&definition.name);
                         let problem = format!("{name} is no constant; make it a definition");

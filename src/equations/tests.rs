@@ -177,6 +177,10 @@ fn faults_are_one_line_with_their_place() {
             "=>; write >= to compare",
         ),
         (
+            "[states]\nh = { rate = \"-k*h**2\" }\n",
+            "**; write ^ for a power",
+        ),
+        (
             "[states]\nh = { rate = \"1\", next = \"2\" }\n",
             "h has rate and next",
         ),

@@ -314,20 +314,22 @@ fn ambiguous(header: &[&str], names: &[Option<String>], signals: &Signals) -> Op
     None
 }
 
-/// The error of a name that is not the twin's.
 /// Returns whether the twin has a channel of this usual name, as far as it is known.
 fn is_of(usual: &str, signals: Option<&Signals>) -> bool {
-    let Some(signals) = signals else {
+    let (Some(signals), false) = (signals, usual == "t") else {
         return true;
     };
-    let number = usual[1..].parse().unwrap_or(1);
-    match usual.as_bytes()[0] {
-        b'u' => number <= signals.inputs.len(),
-        b'y' => number <= signals.outputs.len(),
-        _ => true,
+    let channels = match usual.starts_with('u') {
+        true => signals.inputs.len(),
+        false => signals.outputs.len(),
+    };
+    match &usual[1..] {
+        "" => channels == 1,
+        number => (number.parse()).is_ok_and(|number| (1..=channels).contains(&number)),
     }
 }
 
+/// The error of a name that is not the twin's.
 fn unknown_key(key: &str, signals: Option<&Signals>) -> String {
     let own = signals.map(|s| s.inputs.iter().chain(&s.outputs));
     let mut known = vec!["t"];
@@ -489,6 +491,7 @@ mod tests {
             ("t=a,u=a", "a,b", "column \"a\" is to be both"),
             ("y1=t", "t,u,y", "no other one is the time"),
             ("y3=y", "t,u,y", "no channel is called \"y3\""),
+            ("u0=y", "t,u,y", "no channel is called \"u0\""),
             ("u=a,pump=b", "a,b", "two columns are to be u"),
             ("upper=a,y1=b", "a,b", "two columns are to be"),
             ("t=a", "a,a", "column \"a\" appears twice"),

@@ -283,6 +283,8 @@ fn value_of(file: &Spanned<DeTable<'_>>, table: &str, name: &str) -> Option<usiz
 /// Returns how many lines below the line `first`, that of a table's header or of a key, the key stands that a message is about, of which the
 /// parser may tell the table alone: `k1: …` or ``… `blobs` …``, where also a value may stand so.
 fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
+    // Behind it are keys that would be right.
+    let message = message.split(", expected").next().unwrap_or(message);
     let before_colon = message.split(": ").next().filter(|key| !key.contains(' '));
     let quoted = message.split('`').skip(1).step_by(2);
     let lines = || text.lines().skip(first - 1).enumerate();
@@ -290,7 +292,9 @@ fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
         let mut of_table = lines().take_while(|(i, line)| *i == 0 || !line.starts_with('['));
         let is_key = |(_, line): &(usize, &str)| {
             let (own, _) = line.split_once('=').unwrap_or_default();
-            own.trim().trim_matches(['"', '\'']) == key
+            let own = own.trim().trim_matches(['"', '\'']);
+            // A table may stand on the line of its key.
+            (key.strip_prefix(own)).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
         of_table.find(is_key).map(|(below, _)| below)
     };
@@ -464,6 +468,10 @@ mod tests {
             (
                 "twin = 'x'\n[features]\nkind = 'arx'\noutputs = 8\n",
                 "s.toml, line 2: missing key `inputs`",
+            ),
+            (
+                "twin = 'x'\n[prior]\nk2 = [0, 1]\nk1 = { low = 0.4, high = 0.8 }\nk3 = [0, 1]\n",
+                "s.toml, line 4: k1.",
             ),
             (
                 "twin = 'x'\n[record]\nstepp = 0.5\nsamples = 60\nhold = 'zero'\n",

@@ -53,10 +53,17 @@ fn hold_of_all<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Hold>, D::Er
             "hold = \"impulse\" is of a single input; say so where the input is declared",
         )),
         Some((hold, _)) => Ok(Some(*hold)),
-        None => Err(D::Error::unknown_variant(
-            &name,
-            &["zero", "linear", "spline", "nearest"],
-        )),
+        None => {
+            let all = Hold::NAMES
+                .iter()
+                .filter(|(hold, _)| *hold != Hold::Impulse);
+            let all: Vec<_> = all.map(|(_, name)| format!("`{name}`")).collect();
+            let name = excerpt(&name);
+            Err(D::Error::custom(format!(
+                "unknown value `{name}`, expected one of {}",
+                all.join(", ")
+            )))
+        }
     }
 }
 
@@ -216,32 +223,39 @@ pub(super) fn check_features(table: &Spanned<DeValue<'_>>) -> Result<(), (usize,
     let Some(told) = features_error(keys.clone()) else {
         return Ok(());
     };
-    let is_meant = |name: &str| match keys.contains_key(KIND) {
-        false => !did_you_mean(name, [KIND]).is_empty(),
-        // What is missing stands nowhere.
-        true if told.starts_with("missing") => false,
-        true => {
-            let mut others = keys.clone();
-            others.remove(name);
-            features_error(others).as_ref() != Some(&told)
+    let near_kind = |name: &str| did_you_mean(name, [KIND]);
+    let kind_alone = keys.get_key_value(KIND).into_iter();
+    let kind_alone = kind_alone.map(|(key, value)| (key.clone(), value.clone()));
+    let is_of_kind = features_error(kind_alone.collect()).as_ref() == Some(&told);
+    let is_at_fault = |name: &str| {
+        let mut others = keys.clone();
+        others.remove(name);
+        match keys.contains_key(KIND) {
+            false => !near_kind(name).is_empty(),
+            true if is_of_kind => name == KIND,
+            // What is missing stands nowhere.
+            true => {
+                name != KIND
+                    && !told.starts_with("missing")
+                    && features_error(others).as_ref() != Some(&told)
+            }
         }
     };
-    // Nothing can be read without the kind.
-    let (mut names, mut kind) = (vec![], vec![]);
-    for key in keys.keys() {
-        match key.get_ref().as_ref() {
-            KIND => kind.push(key),
-            _ => names.push(key),
-        }
-    }
-    names.append(&mut kind);
-    let Some(key) = names.into_iter().find(|key| is_meant(key.get_ref())) else {
+    let named = told
+        .split('`')
+        .nth(1)
+        .and_then(|name| keys.get_key_value(name));
+    let fault = match named {
+        Some((key, _)) if !is_of_kind => Some(key),
+        _ => keys.keys().find(|key| is_at_fault(key.get_ref())),
+    };
+    let Some(key) = fault else {
         return Err((table.span().start, told));
     };
     let name: &str = key.get_ref();
     let problem = match keys.contains_key(KIND) {
-        false => format!("unknown key `{name}`{}", did_you_mean(name, [KIND])),
-        true if told.contains(&format!("`{name}`")) => told,
+        false => format!("unknown key `{name}`{}", near_kind(name)),
+        true if told.contains(&format!("`{name}`")) || name == KIND => told,
         true => format!("{name}: {told}"),
     };
     Err((key.span().start, problem))

@@ -128,13 +128,8 @@ impl<'t> Parser<'t> {
         let mut is_compared = false;
         loop {
             let (at, token) = self.tokens[0];
-            if token == Token::Sign("=") {
-                let meant = match self.tokens.get(1) {
-                    Some((_, Token::Sign(">"))) => "=>; write >= to compare",
-                    Some((_, Token::Sign("<"))) => "=<; write <= to compare",
-                    _ => "a single =; write == to compare",
-                };
-                return Err((at, meant.into()));
+            if let Some(problem) = foreign(token, self.tokens.get(1).map(|next| next.1)) {
+                return Err((at, problem.into()));
             }
             let Some((operation, left, right, is_exchanged)) = between(token) else {
                 break;
@@ -259,6 +254,17 @@ impl<'t> Parser<'t> {
             Callable::Several(_) | Callable::Clamp => {}
         }
         Ok(())
+    }
+}
+
+/// Says how an operation of other languages is written here.
+fn foreign(token: Token<'_>, next: Option<Token<'_>>) -> Option<&'static str> {
+    match (token, next) {
+        (Token::Sign("="), Some(Token::Sign(">"))) => Some("=>; write >= to compare"),
+        (Token::Sign("="), Some(Token::Sign("<"))) => Some("=<; write <= to compare"),
+        (Token::Sign("="), _) => Some("a single =; write == to compare"),
+        (Token::Sign("*"), Some(Token::Sign("*"))) => Some("**; write ^ for a power"),
+        _ => None,
     }
 }
 

@@ -20,10 +20,10 @@ impl Clock {
     pub fn new(dt: f64, first: f64) -> Self {
         // 10²² is the largest power of ten that is a double.
         let scales = (0..=22).map(|places| 10f64.powi(places));
-        let whole = |scale| Some((whole(dt, scale)?, whole(first, scale)?, scale));
+        let decimal = |scale| Some((decimal_step(dt, scale)?, decimal_time(first, scale)?, scale));
         let (step, first, scale) = scales
             .into_iter()
-            .find_map(whole)
+            .find_map(decimal)
             .unwrap_or((dt, first, 1.0));
         Self { first, step, scale }
     }
@@ -39,13 +39,19 @@ impl Clock {
     }
 }
 
-/// The whole number that is `value` times a scale to the last digits, if there is one.
-fn whole(value: f64, scale: f64) -> Option<f64> {
-    let scaled = value * scale;
+/// A step in units of 1/scale, where that is a whole number of ten digits at most but for what rounding leaves of a step that was computed from
+/// times. One step in 25 000 that is no decimal is one of ten digits by chance; with three digits more, one in 25.
+fn decimal_step(dt: f64, scale: f64) -> Option<f64> {
+    let scaled = dt * scale;
     let whole = scaled.round();
-    // A hundredth: of seventeen digits, the last ones always end at a whole number.
-    let is_near = (scaled - whole).abs() <= (8.0 * f64::EPSILON * scaled.abs()).min(0.01);
-    (is_near && whole.abs() < 1.0 / f64::EPSILON).then_some(whole)
+    let is_near = (scaled - whole).abs() <= 8.0 * f64::EPSILON * scaled;
+    (is_near && whole <= 1e10).then_some(whole)
+}
+
+/// A time in units of 1/scale, where that is a whole number to the last digit.
+fn decimal_time(time: f64, scale: f64) -> Option<f64> {
+    let whole = (time * scale).round();
+    (whole / scale == time && whole.abs() < 1.0 / f64::EPSILON).then_some(whole)
 }
 
 #[cfg(test)]
@@ -81,5 +87,27 @@ mod tests {
             (0.5 + 4.0 / 3.0, 4.0 / 3.0)
         );
         assert_eq!(Clock::new(1e-200, 0.0).since(2), 2e-200);
+    }
+
+    /// Steps that are no decimals are multiplied, and a first time is what it was.
+    #[test]
+    fn what_is_no_decimal_stays() {
+        for parts in [3.0, 9.0, 17.0, 360.0, 44_100.0] {
+            let clock = Clock::new(1.0 / parts, 0.0);
+            for seconds in 1..200 {
+                let k = seconds as f64 * parts;
+                assert_eq!(clock.time(k as usize), k * (1.0 / parts), "{k} of {parts}");
+            }
+        }
+        for first in [
+            1_700_000_000.000_001,
+            1_700_000_000.250_000_5,
+            0.1 + 0.2,
+            -1.0 / 3.0,
+        ] {
+            for dt in [0.5, 0.1, 1.0, 1.0 / 7.0] {
+                assert_eq!(Clock::new(dt, first).time(0), first, "{first} {dt}");
+            }
+        }
     }
 }

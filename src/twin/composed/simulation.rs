@@ -157,16 +157,16 @@ impl<'d> Acting<'d> {
     pub fn before(&self, i: usize) -> Now<'_> {
         let (dt, before) = (self.drive.dt(), self.before);
         let mut now = self.at(0);
+        let first_row = now.t;
+        let time = |i: usize| match before.steps - i {
+            0 => first_row,
+            left if left == before.steps => before.begun,
+            left => first_row - left as f64 * dt,
+        };
         now.between = None;
         now.u = &self.inputs_before;
-        (now.t, now.dt) = match i {
-            0 => (before.begun, before.first),
-            i => (now.t - (before.steps - i) as f64 * dt, dt),
-        };
-        now.end = match i + 1 == before.steps {
-            true => self.drive.own_time(0),
-            false => now.t + now.dt,
-        };
+        now.dt = if i == 0 { before.first } else { dt };
+        (now.t, now.end) = (time(i), time(i + 1));
         now.since = if i < 2 { before.first } else { dt };
         now
     }

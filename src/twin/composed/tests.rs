@@ -2,6 +2,7 @@
 
 use crate::effect::{Catalogue, augment};
 use crate::likelihood::kalman::{FilterSettings, Kalman};
+use crate::math::Lanes;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{
     Adaptation, Hold, Integrator, Interval, Noise, NoiseLevel, Now, Outline, Parameter, StartLevel,
@@ -202,4 +203,64 @@ fn independent_parts_commute() {
         kalman.log_likelihood(&theta(twin)).unwrap()
     });
     assert!((a - b).abs() < 1e-9, "{a} {b}");
+}
+
+/// Filters side by side have the noise levels of each alone, however many there are and whatever else parts change.
+#[test]
+fn noise_is_the_same_side_by_side() {
+    let effect = |id: &str, target: &str| Catalogue::default().effect(id, target).unwrap();
+    let parts: [&[(&str, &str)]; 4] = [
+        &[],
+        &[("quadratic-drag", "h2"), ("sensor-lag", "sensor")],
+        &[("process-noise", "h1"), ("sensor-noise", "sensor")],
+        &[("parameter-drift", "k1"), ("actuator-delay", "actuator")],
+    ];
+    let adaptation = Adaptation {
+        noise: [
+            ("h1".to_owned(), NoiseLevel::declared(0.03)),
+            ("y".to_owned(), NoiseLevel::Estimate),
+        ]
+        .into(),
+        ..Adaptation::default()
+    };
+    for (parts, is_adapted) in parts.into_iter().flat_map(|p| [(p, false), (p, true)]) {
+        let effects = parts.iter().map(|(id, target)| effect(id, target));
+        let mut twin = augment(Twin::new(CascadedTanks), effects.collect()).unwrap();
+        if is_adapted {
+            twin = adapt(twin, &adaptation, 0.5).unwrap();
+        }
+        let centre = twin.parameters().centre();
+        let Twin::Equations(twin) = twin else {
+            panic!("equations");
+        };
+        let n = twin.outline().states.len();
+        let theta: Vec<Vec<f64>> = (0..8)
+            .map(|lane| {
+                centre
+                    .iter()
+                    .map(|v| v * (1.0 + 0.01 * f64::from(lane)))
+                    .collect()
+            })
+            .collect();
+        let states = |lane: usize| (0..n).map(move |i| (1 + lane + i) as f64);
+        let x: Vec<Lanes> = (0..n)
+            .map(|i| Lanes(std::array::from_fn(|lane| states(lane).nth(i).unwrap())))
+            .collect();
+        for lanes in [1, 3, 8] {
+            let now: Vec<Now<'_>> = (theta.iter().take(lanes))
+                .map(|theta| Now::new(7.0, 2.0, &[3.0], theta))
+                .collect();
+            let (mut q, mut r) = (vec![Lanes([1.0; 8]); n], Lanes([1.0; 8]));
+            twin.noise_lanes(&now, &x, &mut q, &mut r);
+            for (lane, now) in now.iter().enumerate() {
+                let (mut process, mut measurement) = (vec![0.0; n], vec![0.0]);
+                let x: Vec<f64> = states(lane).collect();
+                twin.noise(now, &x, &mut process, &mut measurement);
+                let beside: Vec<f64> = q.iter().map(|q| q.0[lane]).collect();
+                assert_eq!(beside, process, "{parts:?} {is_adapted} {lane} of {lanes}");
+                assert_eq!(r.0[lane], measurement[0], "{parts:?} {is_adapted}");
+                assert!(measurement[0] > 0.0);
+            }
+        }
+    }
 }

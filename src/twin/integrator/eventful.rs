@@ -138,8 +138,7 @@ impl EventMemory {
 
     /// Keeps the conditions of the centre at the end of a way.
     fn end(&mut self, events: &EventsOfWay<'_>, way: &Now<'_>, watches: &[EventWatch]) {
-        let end = way.t + way.dt;
-        self.before = Some((end, watches[0].truths()));
+        self.before = Some((way.end, watches[0].truths()));
         if let Some((event, fired)) = watches.iter().find_map(EventWatch::fault) {
             let event = &events.calls.list[event];
             let (fault, remedy) = match event.is_timed() {

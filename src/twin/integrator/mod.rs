@@ -31,7 +31,8 @@ pub struct Now<'a> {
     pub t: f64,
     /// Step Δt in seconds: to the next sample, or a substep where [`StateSpace::drift`](crate::twin::StateSpace::drift) is evaluated.
     pub dt: f64,
-    /// Time at the end of the step, to the last digit that of the next sample: t + Δt may be rounded to the number beside it.
+    /// Time at the end of the step, to the last digit that of the next sample: t + Δt may be rounded to the number beside it. For integrators:
+    /// it stays where laws and noise see another time or step.
     pub(crate) end: f64,
     /// Time in seconds since the sample before, over which what a sensor remembers has moved; Δt at the first one.
     pub(crate) since: f64,

@@ -29,11 +29,13 @@ impl Path<'_, '_> {
         of.length * self.now.dt
     }
 
-    /// Time at a share of the way.
+    /// Time at a share of the way: nowhere on it behind its end, which several stretches may miss by a last digit.
     pub fn time(&self, share: f64) -> f64 {
-        match share == 1.0 {
-            true => self.now.end,
-            false => self.now.t + share * self.now.dt,
+        let time = self.now.t + share * self.now.dt;
+        match share - 1.0 {
+            left if left.abs() < 8.0 * f64::EPSILON => self.now.end,
+            left if left < 0.0 => time.min(self.now.end),
+            _ => time,
         }
     }
 

@@ -364,6 +364,11 @@ impl StateSpace for Alarm {
     fn outline(&self) -> Outline {
         let limit = self.limit;
         let passed = Event::when("passed", move |now, _| now.t - limit, |_, x| x[0] += 1.0);
+        // Others, that change nothing, cut the ways to rows and from them.
+        let beside = |part: f64| {
+            let margin = move |now: &Now<'_>, _: &[f64]| (20.0 * now.t + part).sin();
+            Event::when("beside", margin, |_, _| {})
+        };
         Outline::new()
             .parameter(Parameter::new("k", "-", 0.5, 2.0))
             .state("count", "-")
@@ -371,6 +376,8 @@ impl StateSpace for Alarm {
             .output("count", "-")
             .output("since", "s")
             .event(passed)
+            .event(beside(0.3))
+            .event(beside(1.7))
     }
     fn drift(&self, now: &Now<'_>, _: &[f64], dx: &mut [f64]) {
         dx[1] = f64::from(now.t > self.limit);

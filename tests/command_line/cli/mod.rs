@@ -467,7 +467,10 @@ fn wrong_studies_are_refused_with_file_and_line() {
         ("substeps = 0", ["substeps = 0", "between 1 and 1000"]),
         ("substeps = 1001", ["substeps = 1001", "between 1 and 1000"]),
         ("substeps = 1e9", ["line 3", "floating point"]),
-        ("hold = 'cubic'", ["line 3", "`zero`, `linear`, `nearest`"]),
+        (
+            "hold = 'cubic'",
+            ["line 3", "`zero`, `linear`, `spline`, `nearest`"],
+        ),
     ] {
         check(&format!("twin = 'tanks'\n[record]\n{key}\n"), &parts);
     }

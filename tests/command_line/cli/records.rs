@@ -147,7 +147,7 @@ fn wrong_columns_are_refused_in_one_line() {
         "t=t,u=t",
         &["r.csv: column \"t\" is to be both", "own column"],
     );
-    call("y2=y", &["r.csv: no column is given for y1"]);
+    call("y2=y", &["no channel is called \"y2\""]);
     call(
         "level=y",
         &["no channel is called \"level\"", "there are t, u, y"],

@@ -120,6 +120,19 @@ fn equations_see_the_records_own_time() {
             assert!((y[[k, 0]] - expected(at, 2.0, k)).abs() < 1e-9, "{at} {k}");
         }
     }
+    // Steps to the first row end where the next one begins.
+    let Twin::Equations(twin) = begun(73.33) else {
+        panic!("equations");
+    };
+    let acting = Acting::of(&twin, &[1.0], &late).unwrap();
+    let steps: Vec<Now<'_>> = (0..acting.steps_before())
+        .map(|i| acting.before(i))
+        .chain([acting.at(0)])
+        .collect();
+    assert!(steps.len() > 100);
+    for pair in steps.windows(2) {
+        assert_eq!(pair[0].end, pair[1].t);
+    }
     let problem = begun(100.2).check_drive(&late).unwrap_err().to_string();
     assert!(
         problem.contains("100.2 s, after the first row at 100 s"),
