@@ -261,6 +261,8 @@ mod tests {
         }
         let text = message("t,u,y\n-1.7e308,1,2\n0,1,2\n");
         assert!(text.contains("-1.7e308 is beyond"), "{text}");
+        let text = message("t,u,y\ns,V,m\n0,1,2\n1,1,2\n");
+        assert!(text.contains(": row 2 has no number; remove it"), "{text}");
         for missing in ["", "nan", "NaN", "NA"] {
             let text = message(&format!("t,u,y\n0,1,2\n1,{missing},2\n2,1,2\n"));
             assert!(text.contains("row 3, column u: no value;"), "{text}");

@@ -131,8 +131,12 @@ impl Table {
             }
             for ((cell, place), name) in cells.iter().zip(&places).zip(&header) {
                 if let Some(place) = *place {
-                    row[place] = (parser.parse(cell, place, number))
-                        .map_err(|problem| RecordError::cell(path, number, name, problem))?;
+                    row[place] = (parser.parse(cell, place, number)).map_err(|problem| {
+                        match t.is_empty() && has_no_number(&cells) {
+                            true => units(path, number),
+                            false => RecordError::cell(path, number, name, problem),
+                        }
+                    })?;
                 }
             }
             t.push(row[0]);
@@ -270,6 +274,19 @@ impl CellParser {
             )),
         }
     }
+}
+
+/// The error of a first row without numbers.
+fn units(path: &Path, row: usize) -> RecordError {
+    let problem = format!("row {row} has no number; remove it, if it has units");
+    RecordError::file(path, problem)
+}
+
+/// Returns whether no cell is a number or a time: units stand in such a row.
+fn has_no_number(cells: &csv::StringRecord) -> bool {
+    cells.iter().all(|cell| {
+        Stamp::parse(cell).is_none() && cell.replace(',', ".").trim().parse::<f64>().is_err()
+    })
 }
 
 fn not_a_stamp(cell: &str) -> String {
