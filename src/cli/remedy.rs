@@ -166,7 +166,7 @@ impl Remedy for StudyError {
                 "[record] input = { levels = [low, high], hold = n }, a file, or a plan for each input, in the study file"
                     .into()
             }
-            Self::NoPlan => "[record] step, samples and input of the study file".into(),
+            Self::NoPlan => "all of them in [record] of the study file".into(),
             Self::Steps { expected, .. } => format!(
                 "`truetwin resample R.csv --step {} --out R2.csv`",
                 number(*expected)

@@ -266,13 +266,18 @@ impl FromStr for Columns {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let mut columns = BTreeMap::new();
-        for part in text.split(',') {
+        let mut is_quoted = false;
+        let between = |c: char| {
+            is_quoted ^= c == '"';
+            c == ',' && !is_quoted
+        };
+        for part in text.split(between) {
             let (key, column) = (part.split_once('='))
-                .map(|(key, column)| (key.trim(), column.trim()))
+                .map(|(key, column)| (key.trim(), unquoted(column.trim())))
                 .filter(|(key, column)| !key.is_empty() && !column.is_empty())
                 .ok_or_else(|| {
                     format!(
-                        "\"{}\" is not name=column; write t=time,u=pump",
+                        "\"{}\" is not name=column; write t=time,u=pump, or u=\"pump, V\" for a name with a comma",
                         quoted(part)
                     )
                 })?;
@@ -282,6 +287,14 @@ impl FromStr for Columns {
         }
         Ok(Self(columns))
     }
+}
+
+/// The name between quotes.
+fn unquoted(name: &str) -> &str {
+    let inner = name
+        .strip_prefix('"')
+        .and_then(|name| name.strip_suffix('"'));
+    inner.unwrap_or(name)
 }
 
 /// Returns the two columns of a header that are one channel of the twin, under different names; or one that is two channels.
@@ -490,6 +503,11 @@ mod tests {
             ),
             ("t=a,u=a", "a,b", "column \"a\" is to be both"),
             ("y1=t", "t,u,y", "no other one is the time"),
+            (
+                "pump=\"a, V\",y1=b",
+                "t,a,b",
+                "no column is called \"a, V\"",
+            ),
             ("y3=y", "t,u,y", "no channel is called \"y3\""),
             ("u0=y", "t,u,y", "no channel is called \"u0\""),
             ("u=a,pump=b", "a,b", "two columns are to be u"),

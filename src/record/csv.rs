@@ -240,7 +240,7 @@ mod tests {
             reader.record(&path).unwrap();
         }
         let error = reader.record(&path).unwrap_err().to_string();
-        assert!(error.contains("in all records together; cut"), "{error}");
+        assert!(error.contains("in all records; cut"), "{error}");
     }
 
     #[test]

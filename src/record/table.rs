@@ -132,10 +132,8 @@ impl Table {
             for ((cell, place), name) in cells.iter().zip(&places).zip(&header) {
                 if let Some(place) = *place {
                     row[place] = (parser.parse(cell, place, number)).map_err(|problem| {
-                        match t.is_empty() && has_no_number(&cells) {
-                            true => units(path, number),
-                            false => RecordError::cell(path, number, name, problem),
-                        }
+                        let row = t.is_empty().then_some(&cells);
+                        cell_error(path, (number, name), row, problem)
                     })?;
                 }
             }
@@ -276,17 +274,23 @@ impl CellParser {
     }
 }
 
-/// The error of a first row without numbers.
-fn units(path: &Path, row: usize) -> RecordError {
-    let problem = format!("row {row} has no number; remove it, if it has units");
-    RecordError::file(path, problem)
-}
-
-/// Returns whether no cell is a number or a time: units stand in such a row.
-fn has_no_number(cells: &csv::StringRecord) -> bool {
-    cells.iter().all(|cell| {
-        Stamp::parse(cell).is_none() && cell.replace(',', ".").trim().parse::<f64>().is_err()
-    })
+/// The error of a cell, or of its row where that is the first one and has no number: units stand in such a row.
+fn cell_error(
+    path: &Path,
+    (row, column): (usize, &str),
+    first: Option<&csv::StringRecord>,
+    problem: String,
+) -> RecordError {
+    let is_number = |cell: &str| {
+        Stamp::parse(cell).is_some() || cell.replace(',', ".").trim().parse::<f64>().is_ok()
+    };
+    match first.is_some_and(|cells| !cells.iter().any(is_number)) {
+        true => {
+            let problem = format!("row {row} has no number; remove it, if it has units");
+            RecordError::file(path, problem)
+        }
+        false => RecordError::cell(path, row, column, problem),
+    }
 }
 
 fn not_a_stamp(cell: &str) -> String {

@@ -73,7 +73,7 @@ pub enum StorageError {
     },
     /// An input folder that the verb did not make, or whose manifest is damaged.
     #[error(
-        "{}: no {verb} folder ({reason}); name one, or make this one again",
+        "{}: no {verb} folder ({reason}); name one, or remove this and make it again",
         path.display()
     )]
     Foreign {

@@ -336,6 +336,11 @@ mod tests {
             ("[noise]\ny = 0.1\nh1 = nan", 4, "noise h1 = NaN"),
             ("[start]\nh9 = 1.0", 3, "start names h9"),
             (
+                "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n[bounds]\n'sensor-lag@sensor.tau' = [-2.0, 3.0]",
+                6,
+                "bounds sensor-lag@sensor.tau = -2; the law's own limits",
+            ),
+            (
                 "[library]\n\nwithout = [\n'sensor-lag',\n'foo']",
                 6,
                 "library: foo",

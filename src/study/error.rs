@@ -138,7 +138,9 @@ pub enum StudyError {
     #[error("no record given; pass at least one")]
     NoRecord,
     /// Simulated records of a study that does not say what they look like.
-    #[error("the study has no plan of simulated records; give it their step, samples and input")]
+    #[error(
+        "the study has no plan of simulated records; give it step and samples, and input if the twin has one"
+    )]
     NoPlan,
     /// Records of a diagnosis have different steps.
     #[error("{} has a step of {} s, the first record {} s; resample it", name(*record), number(*given), number(*expected))]

@@ -471,7 +471,11 @@ fn a_damaged_bank_is_named_with_its_remedy() {
     refused(
         place.path(),
         train,
-        &["bank: ", "manifest.json is damaged", "make this one again"],
+        &[
+            "bank: ",
+            "manifest.json is damaged",
+            "remove this and make it again",
+        ],
     );
     refused(
         place.path(),

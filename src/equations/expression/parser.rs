@@ -349,8 +349,10 @@ mod tests {
             ("sin + 1", 0, "write sin("),
             ("1 < 2 < 3", 6, "second comparison"),
             ("1 = 2", 2, "write =="),
+            ("1 => 2", 2, "write >="),
+            ("1 =< 2", 2, "write <="),
             ("and 1", 0, "unexpected \"and\""),
-            ("2 ** 3", 3, "unexpected \"*\""),
+            ("2 ** 3", 2, "write ^"),
         ] {
             let (byte, problem) = Expression::parse(text).unwrap_err();
             assert!(problem.contains(part), "{text}: {problem}");

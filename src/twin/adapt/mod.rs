@@ -237,6 +237,19 @@ fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(),
         parameters[index].prior = prior;
     }
     for (index, _, bounds) in indexed("bounds", &adaptation.bounds, &names)? {
+        let own = parameters[index].bounds;
+        let beyond = [bounds.low(), bounds.high()].into_iter();
+        let mut beyond = beyond.filter(|end| !own.contains(*end));
+        if parameters[index].role == Role::Magnitude
+            && let Some(value) = beyond.next()
+        {
+            return Err(TwinError::Value {
+                table: "bounds",
+                name: names[index].clone(),
+                value,
+                remedy: "the law's own limits of a magnitude hold; choose bounds inside them",
+            });
+        }
         parameters[index].bounds = bounds;
     }
     // A study may hold all parameters.

@@ -361,7 +361,8 @@ pub(super) fn simulate(
         if !y.iter().all(|v| v.is_finite()) {
             return Err(SimulationError::Diverged { at: now.t });
         }
-        if !acting.stands(k) {
+        // What is behind the last row is nobody's.
+        if k + 1 < samples && !acting.stands(k) {
             carry(&now, &q, &mut x)?;
         }
     }

@@ -4,7 +4,7 @@ use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
 use crate::record::{Drive, Signal};
 use crate::setting::{number, unit_suffix};
-use crate::twin::{Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, Twin};
+use crate::twin::{Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, TOLERANCES, Twin};
 
 /// Largest error of the step where no noise is declared, as a share of an output's deviation.
 const STEP_SHARE: f64 = 0.01;
@@ -99,9 +99,10 @@ pub(crate) fn step_length(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<S
         return Some(StepLength::Fine);
     }
     if equations.workspace().steps_taken().is_some() {
-        let tolerance = equations.stepping().tolerance * FINER;
+        let finer = equations.stepping().tolerance * FINER;
+        let tolerance = number(finer.max(*TOLERANCES.start()));
         return Some(StepLength::Coarse(format!(
-            "too long: with finer ones, {}; give the study tolerance = {tolerance:e}",
+            "too long: with finer ones, {}; give the study tolerance = {tolerance}",
             coarse.join("; ")
         )));
     }

@@ -89,6 +89,9 @@ impl Workspace {
             Some(schedule) => schedule.chosen(&mut path, &mut x[..n].to_vec(), &rules),
             None => path.equal(refined.substeps),
         };
+        if stretches.is_empty() {
+            return x.fill(f64::NAN);
+        }
         let mut step =
             |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| match &mut self.schedule {
                 Some(schedule) => schedule.step(path, of, x, None),

@@ -285,9 +285,10 @@ impl Workspace {
         }
     }
 
-    /// Returns what is wrong with a run that ended in events without end.
+    /// Returns what is wrong with a run that ended in events without end, or in too many steps.
     pub(crate) fn fault(&self) -> Option<&str> {
-        self.events.fault.as_deref()
+        let steps = self.schedule.as_ref().and_then(SubstepSchedule::fault);
+        self.events.fault.as_deref().or(steps)
     }
 
     /// Returns whether a sample is one step of Euler's rule, inputs held.

@@ -7,6 +7,7 @@ use super::rosenbrock::{self, Rosenbrock};
 use super::watch::{EventWatch, EventsOfWay, StepBy};
 use super::{Integrator, MOST_SUBSTEPS, Stepping};
 use crate::math::three_digits;
+use crate::setting::number;
 use crate::twin::Interval;
 use serde::Serialize;
 
@@ -146,6 +147,10 @@ pub(super) struct SubstepSchedule {
     implicit: Rosenbrock,
     buffers: ScheduleBuffers,
     taken: StepsTaken,
+    /// Steps beyond [`MOST_SUBSTEPS`] of a sample that the run may still take: a gap in a record has many, not every sample.
+    spare: usize,
+    /// A sentence about steps that the tolerance needs and that are not taken.
+    fault: Option<String>,
 }
 
 /// Buffers of a sample's choice, kept so that none allocates.
@@ -181,12 +186,20 @@ impl SubstepSchedule {
             implicit: Rosenbrock::default(),
             buffers: ScheduleBuffers::default(),
             taken: StepsTaken::default(),
+            // A hundredth of a second of equations that take 100 ns.
+            spare: 100 * MOST_SUBSTEPS,
+            fault: None,
         })
     }
 
     /// Returns whether the steps are implicit.
     pub fn is_implicit(&self) -> bool {
         self.is_implicit
+    }
+
+    /// Returns what is wrong with a run whose steps are too many.
+    pub fn fault(&self) -> Option<&str> {
+        self.fault.as_deref()
     }
 
     /// Substeps so far.
@@ -313,8 +326,11 @@ impl SubstepSchedule {
             if steps >= most && (self.is_implicit || falls.are_stiff()) {
                 return SampleSteps::Many { covered: from };
             }
-            if steps == MOST_SUBSTEPS {
-                shortest = (1.0 - from) / MOST_SUBSTEPS as f64;
+            if steps >= MOST_SUBSTEPS {
+                if self.spare == 0 && shortest == SHORTEST {
+                    shortest = (1.0 - from) / MOST_SUBSTEPS as f64;
+                }
+                self.spare = self.spare.saturating_sub(1);
             }
             steps += 1;
             let end = path.next_break(from);
@@ -333,6 +349,12 @@ impl SubstepSchedule {
                 false => CHANGE.0,
             };
             next = factor * of.length * dt;
+            // A thousand steps with a thousandth of a state's size each are no way. At a jump of rates, a shortest step may have any error.
+            let is_forced = shortest > SHORTEST && longest <= shortest;
+            if is_forced && size.is_finite() && size > 1e-3 / self.tolerance {
+                self.give_up(path, x);
+                return SampleSteps::Done;
+            }
             if size <= 1.0 || longest <= shortest {
                 let reached = if parts == 1.0 { end } else { from + of.length };
                 from = self.keep(path, &mut rules, (of, reached), (x, trial));
@@ -340,6 +362,16 @@ impl SubstepSchedule {
         }
         self.next = next;
         SampleSteps::Done
+    }
+
+    /// Ends the run of these points.
+    fn give_up(&mut self, path: &Path<'_, '_>, x: &mut [f64]) {
+        let [from, to] = [path.now.t, path.now.end].map(number);
+        self.fault = Some(format!(
+            "the tolerance needs too many steps between t = {from} s and {to} s; give rows between, or choose the stiff integrator"
+        ));
+        self.stretches.clear();
+        x.fill(f64::NAN);
     }
 
     /// Returns whether rates jump in steps of these lengths, beyond the tolerance: errors then grow in proportion to the length. Those of smooth rates
@@ -395,7 +427,9 @@ impl SubstepSchedule {
         // Where rates are fast besides, as many as the smooth samples before took.
         let smooth = (path.now.dt / self.next).ceil() as usize;
         let least = (EVEN * self.least).min(MOST_SUBSTEPS);
-        let longest = 1.0 / smooth.clamp(least, MOST_SUBSTEPS) as f64;
+        let steps = smooth.clamp(least, MOST_SUBSTEPS + self.spare);
+        self.spare -= steps.saturating_sub(MOST_SUBSTEPS);
+        let longest = 1.0 / steps as f64;
         let (mut rules, mut from) = (rules.clone(), 0.0);
         self.is_even = true;
         self.stretches.clear();

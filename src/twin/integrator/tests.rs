@@ -416,3 +416,48 @@ fn a_time_of_a_row_is_passed_once() {
         }
     }
 }
+
+/// ẍ = −ω²·x − 0.3·ẋ from 1.
+struct Swing(f64);
+
+impl StateSpace for Swing {
+    fn outline(&self) -> Outline {
+        let outline = Outline::new().parameter(Parameter::new("k", "-", 0.5, 2.0));
+        let outline = outline.state("x", "m").state("v", "m/s");
+        outline.output("y", "m")
+    }
+    fn drift(&self, _: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        (dx[0], dx[1]) = (x[1], -self.0.powi(2) * x[0] - 0.3 * x[1]);
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y[0] = x[0];
+    }
+    fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+        x[0] = 1.0;
+    }
+    fn integrator(&self) -> Integrator {
+        Integrator::Adaptive
+    }
+}
+
+/// A gap takes the steps that it needs; one that needs too many ends the run, and is not gone over in steps that are too long.
+#[test]
+fn a_long_gap_is_crossed_or_refused() {
+    let after = |omega: f64, gap: f64| -> Result<f64, _> {
+        let drive = Drive::autonomous(gap, 2).unwrap();
+        let y = Swing(omega).simulate(&[1.0], &drive, Noise::OFF);
+        y.map(|y| y[[1, 0]])
+    };
+    for gap in [20.0f64, 300.0, 1200.0, 2700.0] {
+        let omega = (3.1f64.powi(2) - 0.0225).sqrt();
+        let exact =
+            (-0.15 * gap).exp() * ((omega * gap).cos() + 0.15 / omega * (omega * gap).sin());
+        let y = after(3.1, gap).unwrap();
+        assert!((y - exact).abs() < 1e-4, "{gap} s: {y} {exact}");
+    }
+    let error = after(1e5, 1e4).unwrap_err().to_string();
+    assert!(
+        error.contains("too many steps between t = 0 s and 10000 s"),
+        "{error}"
+    );
+}
