@@ -223,6 +223,10 @@ impl SubstepSchedule {
             };
             return self.choose(path, x, &rules);
         }
+        if self.stretches.is_empty() {
+            // The first ones gave up.
+            return x.fill(f64::NAN);
+        }
         for i in 0..self.stretches.len() {
             self.step(path, self.stretches[i], x, None);
             limited(n, x, limits);
