@@ -41,6 +41,18 @@ impl Columns {
         self.0.is_empty()
     }
 
+    /// Checks that each key is a channel of a twin, or the time.
+    pub(crate) fn check(&self, signals: &Signals) -> Result<(), String> {
+        let is_known = |key: &&String| {
+            let usual = usual_name(key, Some(signals));
+            usual.is_some_and(|name| is_of(&name, Some(signals)))
+        };
+        match self.0.keys().find(|key| !is_known(key)) {
+            None => Ok(()),
+            Some(key) => Err(unknown_key(key, Some(signals))),
+        }
+    }
+
     /// The same without those of outputs, for files of time and inputs.
     pub(super) fn without_outputs(&self, signals: Option<&Signals>) -> Self {
         let is_output = |key: &str| usual_name(key, signals).is_some_and(|n| n.starts_with('y'));

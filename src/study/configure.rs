@@ -87,6 +87,7 @@ impl Study {
         if let Some(plan) = &plan {
             plan.check(&twin.signals())?;
         }
+        (file.record.columns.check(&twin.signals())).map_err(StudyError::Plan)?;
         Ok(Self {
             twin,
             plan,
@@ -335,6 +336,17 @@ mod tests {
             ("[fixed]\nk7 = 1.0", 3, "fixed: no parameter is called k7"),
             ("[noise]\ny = 0.1\nh1 = nan", 4, "noise h1 = NaN"),
             ("[start]\nh9 = 1.0", 3, "start names h9"),
+            ("[noise]\nprocess = 3.0", 3, "noise process = 3; process is"),
+            (
+                "[record.columns]\nyy = 'level'",
+                2,
+                "columns: no channel is called \"yy\"",
+            ),
+            (
+                "[record]\nstep = 1.0\nsamples = 50\n[record.input]\n\nu = { levels = [0.0, 1.0], hold = 0 }",
+                7,
+                "input u: hold = 0",
+            ),
             (
                 "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n[bounds]\n'sensor-lag@sensor.tau' = [-2.0, 3.0]",
                 6,

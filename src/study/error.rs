@@ -7,6 +7,7 @@ use crate::record::RecordError;
 use crate::setting::{SettingError, count, did_you_mean, number};
 use crate::storage::files::with_remedy;
 use crate::twin::{SimulationError, TwinError};
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// Error of a study, its file, its records, or a fit or diagnosis of them.
@@ -209,21 +210,32 @@ impl StudyError {
     };
 
     /// Returns the table and the key of a study file that it is about, if it is about one.
-    pub(super) fn key(&self) -> Option<(&'static str, &str)> {
-        Some(match self {
+    pub(super) fn key(&self) -> Option<(&'static str, Cow<'_, str>)> {
+        let (table, name): (&'static str, &str) = match self {
             Self::Adaptation(TwinError::UnknownIn { table, name, .. })
             | Self::Adaptation(TwinError::Value { table, name, .. })
-            | Self::Twice { table, name } => (table, name),
+            | Self::Twice { table, name } => (*table, name),
             Self::Adaptation(TwinError::Parameter { name, .. }) => ("prior", name),
             Self::Adaptation(TwinError::Begins { name, .. }) => ("start", name),
             Self::Fixed { name, .. } => ("fixed", name),
             Self::UnknownEffect { name, .. } => ("library", name),
             Self::NoEffects => ("library", "only"),
             Self::Record(RecordError::Step(_)) => ("record", "step"),
-            // These begin with the key.
-            Self::Plan(problem) => ("record", problem.split([' ', ':']).next()?),
+            // These begin with the key, and those of a plan for each input have its name.
+            Self::Plan(problem) => match problem.split([' ', ':']).next()? {
+                "input" => {
+                    let own = problem.strip_prefix("input ");
+                    let own = own.and_then(|rest| rest.split(':').next());
+                    let name = own
+                        .or_else(|| problem.split('"').nth(1))
+                        .unwrap_or_default();
+                    return Some(("record", format!("input.{name}").into()));
+                }
+                key => ("record", key),
+            },
             _ => return None,
-        })
+        };
+        Some((table, name.into()))
     }
 
     /// Returns what stands for the record that caused the error among what stands for all of them, if one did.

@@ -244,7 +244,7 @@ impl StudyFile {
         let line = |text: &str| {
             let (table, name) = error.key()?;
             let file = DeTable::parse(text).ok()?;
-            let of = |table| value_of(&file, table, name);
+            let of = |table| value_of(&file, table, &name);
             // What a prior leaves may be told in the other table alone.
             let value = of(table).or_else(|| (table == "prior").then(|| of("bounds"))?);
             let table = file.get_ref().get(table).map(|table| table.span().start);
@@ -277,7 +277,9 @@ fn value_of(file: &Spanned<DeTable<'_>>, table: &str, name: &str) -> Option<usiz
         let mut lists = entries.filter_map(|value| value.get_ref().as_array());
         lists.find_map(|list| list.iter().find(|of| of.get_ref().as_str() == Some(name)))
     };
-    value.or_else(listed).map(|value| value.span().start)
+    let whole = || table.get_ref().get(name.split('.').next()?);
+    let value = value.or_else(listed).or_else(whole);
+    value.map(|value| value.span().start)
 }
 
 /// Returns how many lines below the line `first`, that of a table's header or of a key, the key stands that a message is about, of which the

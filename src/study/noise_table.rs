@@ -53,6 +53,20 @@ impl NoiseTable {
         outline: Option<&Outline>,
     ) -> Result<BTreeMap<String, NoiseLevel>, StudyError> {
         let mut all = self.levels.clone();
+        let own = |outline: &Outline| {
+            let mut all = outline.states.iter().chain(&outline.outputs);
+            all.any(|quantity| quantity.name == PROCESS)
+        };
+        if let Some(NoiseLevel::Declared(level)) = all.get(PROCESS)
+            && !outline.is_some_and(own)
+        {
+            return Err(StudyError::Adaptation(TwinError::Value {
+                table: "noise",
+                name: PROCESS.into(),
+                value: level.std,
+                remedy: "process is \"none\", \"fitted\" or \"declared\"",
+            }));
+        }
         let Some(word) = self.process else {
             return Ok(all);
         };
