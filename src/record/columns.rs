@@ -43,14 +43,8 @@ impl Columns {
 
     /// Checks that each key is a channel of a twin, or the time.
     pub(crate) fn check(&self, signals: &Signals) -> Result<(), String> {
-        let is_known = |key: &&String| {
-            let usual = usual_name(key, Some(signals));
-            usual.is_some_and(|name| is_of(&name, Some(signals)))
-        };
-        match self.0.keys().find(|key| !is_known(key)) {
-            None => Ok(()),
-            Some(key) => Err(unknown_key(key, Some(signals))),
-        }
+        let mut keys = self.0.keys();
+        keys.try_for_each(|key| channel_of(key, Some(signals)).map(drop))
     }
 
     /// The same without those of outputs, for files of time and inputs.
@@ -104,8 +98,7 @@ impl Columns {
         let mut names: Vec<Option<String>> = vec![None; header.len()];
         let lacks = signals.is_some_and(|signals| signals.outputs.len() > 1);
         for (key, column) in &self.0 {
-            let known = usual_name(key, signals).filter(|name| is_of(name, signals));
-            let usual = known.ok_or_else(|| unknown_key(key, signals))?;
+            let usual = channel_of(key, signals)?;
             let at = (header.iter()).position(|name| name == column);
             let has_other = |key: &String| {
                 let is_output = |key| usual_name(key, signals).is_some_and(|n| n.starts_with('y'));
@@ -337,6 +330,12 @@ fn ambiguous(header: &[&str], names: &[Option<String>], signals: &Signals) -> Op
         }
     }
     None
+}
+
+/// Returns the usual name of the channel, or the time, that a key is, or the error.
+fn channel_of(key: &str, signals: Option<&Signals>) -> Result<String, String> {
+    let own = usual_name(key, signals).filter(|name| is_of(name, signals));
+    own.ok_or_else(|| unknown_key(key, signals))
 }
 
 /// Returns whether the twin has a channel of this usual name, as far as it is known.
