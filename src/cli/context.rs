@@ -75,7 +75,9 @@ impl Context<'_> {
         if file.own_equations().is_some() {
             return Ok(Study::of_file(&file).in_file(path)?.into());
         }
-        let project = self.named(&file.twin).in_file(path)?;
+        let project = (self.named(&file.twin))
+            .map_err(|error| file.located(error))
+            .in_file(path)?;
         project.configure(&file).in_file(path)
     }
 
@@ -99,13 +101,13 @@ impl Context<'_> {
         }
     }
 
-    pub fn named(&self, name: &str) -> Result<&Project, Failure> {
+    pub fn named(&self, name: &str) -> Result<&Project, StudyError> {
         let mut projects = self.projects.iter();
         let project = projects.find(|project| project.study().name() == name);
         project.ok_or_else(|| {
             let known: Vec<&str> = self.projects.iter().map(|p| p.study().name()).collect();
             let (given, known) = (name.into(), known.join(", "));
-            StudyError::Twin { given, known }.into()
+            StudyError::Twin { given, known }
         })
     }
 

@@ -20,7 +20,7 @@ use super::settings::DiagnoseSettings;
 use super::step::OtherStep;
 use super::thresholds::THRESHOLDS;
 use crate::fit::Warning;
-use crate::fit::posterior::{PosteriorSample, posterior};
+use crate::fit::posterior::{DrawsAsked, PosteriorSample, posterior};
 use crate::hypothesis::search::explanation::Explanation;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::set::TermSet;
@@ -257,7 +257,10 @@ impl Report<'_> {
         let fitted = std::slice::from_ref(&model.fitted);
         let draws = match model.problem.is_simulated() {
             true => PosteriorSample::default(),
-            false => posterior(&model.problem, fitted, None, noise.child("draws"))?,
+            false => {
+                let noise = noise.child("draws");
+                posterior(&model.problem, fitted, DrawsAsked::Usual, noise)?
+            }
         };
         let predictive = Predictive {
             model,

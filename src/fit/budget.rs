@@ -70,7 +70,7 @@ numbers! {
         grown_starts: usize = 4,
         /// Trial points of a search of a black box, at most.
         grown_iterations: usize = 25,
-        /// Samples that are filtered in a round of posterior draws.
+        /// Samples that are filtered in a round of posterior draws, and of which what filters side by side saw is held at once.
         round_samples: usize = 200_000,
         /// Draws that makes at least.
         least_draws: usize = 100,

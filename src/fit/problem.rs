@@ -1,7 +1,7 @@
 //! A twin and the records that it is fitted to.
 
 use crate::fit::axis::{Axis, EvidencePrior, Family};
-use crate::fit::budget::Passes;
+use crate::fit::budget::{BUDGET, Passes};
 use crate::likelihood::kalman::{
     Coordinates, FilterError, Filtered, Gaussian, Responses, Score, States,
 };
@@ -391,6 +391,39 @@ impl Problem {
         (self.records.iter().enumerate())
             .map(|(r, record)| self.counted()?.filtered(&self.of_record(r, theta), record))
             .collect()
+    }
+
+    /// What `then` makes of the innovations of each record at each of several θ, one after the other; `None` where the twin does not work.
+    pub fn each_filtered<T>(
+        &self,
+        thetas: &[Vec<f64>],
+        mut then: impl FnMut(usize, Vec<Filtered>) -> T,
+    ) -> Result<Vec<Option<T>>, FilterError> {
+        let at_once = match self.is_simulated() {
+            true => rayon::current_num_threads(),
+            false => (BUDGET.round_samples / self.samples()).clamp(1, LANES),
+        };
+        let mut all = Vec::with_capacity(thetas.len());
+        for thetas in thetas.chunks(at_once) {
+            let mut found: Vec<Option<Vec<Filtered>>> = vec![Some(vec![]); thetas.len()];
+            for (r, record) in self.records.iter().enumerate() {
+                let own: Vec<Vec<f64>> = thetas.iter().map(|t| self.of_record(r, t)).collect();
+                self.passes.count(own.len())?;
+                let filtered = self.likelihood.filtered_all(&own, record)?;
+                for (found, filtered) in found.iter_mut().zip(filtered) {
+                    let both = found.take().zip(filtered);
+                    *found = both.map(|(mut all, filtered)| {
+                        all.push(filtered);
+                        all
+                    });
+                }
+            }
+            for filtered in found {
+                let i = all.len();
+                all.push(filtered.map(|filtered| then(i, filtered)));
+            }
+        }
+        Ok(all)
     }
 
     /// Innovations and filtered states of each record.

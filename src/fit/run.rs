@@ -8,7 +8,9 @@ use super::follow::{FollowedRecords, steps_taken, swallowed};
 use super::outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue,
 };
-use super::posterior::{FitIntervals, PosteriorRegion, PosteriorSample, posterior, table};
+use super::posterior::{
+    DrawsAsked, FitIntervals, PosteriorRegion, PosteriorSample, posterior, table,
+};
 use super::problem::Problem;
 use super::profile::{Profile, ProfilesOf, profiles};
 use super::searched::Searched;
@@ -44,8 +46,12 @@ pub(crate) fn run(
     let restarts = noise.child("restarts");
     let arrived = stages.of(false, || restarted(&problem, &mut fits, restarts))?;
     let levels = &measured.levels;
-    let asked = (settings.draws > 0).then_some(settings.draws);
-    let draws = match problem.is_simulated() && asked.is_none() {
+    let asked = match settings.draws {
+        0 => DrawsAsked::Usual,
+        count => DrawsAsked::Count(count),
+    };
+    let is_asked = asked != DrawsAsked::Usual;
+    let draws = match problem.is_simulated() && !is_asked {
         true => PosteriorSample::default(),
         false => stages.of(PosteriorSample::default(), || {
             drawn(&problem, &mut fits, asked, noise)
@@ -75,11 +81,11 @@ pub(crate) fn run(
         errors,
         residuals,
     } = stages.whole(|| FollowedRecords::new(&problem, &fitted.theta))?;
-    let posterior = match asked {
-        Some(_) if draws.round.is_some() => stages.of(None, || {
+    let posterior = match is_asked && draws.round.is_some() {
+        true => stages.of(None, || {
             table(&problem, &draws, noise.child("starts")).map(Some)
         })?,
-        _ => None,
+        false => None,
     };
     let own = measured.twin.parameters().len() - levels.len();
     let mut convergence = Convergence {
@@ -160,7 +166,7 @@ fn stated(
 fn drawn(
     problem: &Problem,
     fits: &mut Vec<Fitted>,
-    asked: Option<usize>,
+    asked: DrawsAsked,
     noise: Noise,
 ) -> Result<PosteriorSample, FilterError> {
     let draws = followed(problem, fits, asked, noise.child("posterior"))?;
@@ -181,7 +187,7 @@ fn drawn(
 fn followed(
     problem: &Problem,
     fits: &mut Vec<Fitted>,
-    asked: Option<usize>,
+    asked: DrawsAsked,
     noise: Noise,
 ) -> Result<PosteriorSample, FilterError> {
     let mut draws = posterior(problem, fits, asked, noise)?;

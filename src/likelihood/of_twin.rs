@@ -16,6 +16,12 @@ pub(crate) trait Likelihood: Send + Sync {
     fn outline(&self) -> Outline;
     /// Innovations and their densities.
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError>;
+    /// As [`filtered`](Self::filtered) at several θ, on all cores; `None` where the twin does not work.
+    fn filtered_all(
+        &self,
+        thetas: &[Vec<f64>],
+        record: &Record,
+    ) -> Result<Vec<Option<Filtered>>, FilterError>;
     /// Innovations with the filtered states.
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError>;
     /// The state at the first sample given the whole record; `None` where there are no states.
@@ -81,6 +87,13 @@ impl Likelihood for FilterLikelihood {
     }
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError> {
         self.kalman(record, &self.1)?.filter(theta)
+    }
+    fn filtered_all(
+        &self,
+        thetas: &[Vec<f64>],
+        record: &Record,
+    ) -> Result<Vec<Option<Filtered>>, FilterError> {
+        self.kalman(record, &self.1)?.filter_all(thetas)
     }
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError> {
         let settings = FilterSettings {
@@ -153,6 +166,13 @@ impl Likelihood for EnsembleLikelihood {
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError> {
         ensemble::filtered(&self.0, theta, record)
     }
+    fn filtered_all(
+        &self,
+        thetas: &[Vec<f64>],
+        record: &Record,
+    ) -> Result<Vec<Option<Filtered>>, FilterError> {
+        try_each(thetas, |theta| recoverable(self.filtered(theta, record)))
+    }
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError> {
         let filtered = self.filtered(theta, record)?;
         let predicted = filtered.held_predictions(record.outputs());
@@ -183,11 +203,10 @@ impl Likelihood for EnsembleLikelihood {
         thetas: &[Vec<f64>],
         record: &Record,
     ) -> Result<Vec<Option<f64>>, FilterError> {
-        let value = |theta: &Vec<f64>| {
-            let found = recoverable(self.filtered(theta, record))?;
-            Ok(found.map(|filtered| filtered.log_likelihood))
-        };
-        try_each(thetas, value)
+        let found = self.filtered_all(thetas, record)?.into_iter();
+        Ok(found
+            .map(|filtered| Some(filtered?.log_likelihood))
+            .collect())
     }
     fn score(&self, _: &[f64], _: &Record, _: &Coordinates) -> Result<Option<Score>, FilterError> {
         Ok(None)

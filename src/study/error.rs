@@ -216,10 +216,16 @@ impl StudyError {
             | Self::Adaptation(TwinError::Value { table, name, .. })
             | Self::Twice { table, name } => (*table, name),
             Self::Adaptation(TwinError::Parameter { name, .. }) => ("prior", name),
+            Self::Adaptation(TwinError::NoPrior(unknown)) => match unknown.split_once('.')? {
+                ("noise", name) => ("noise", name),
+                ("start", name) => ("start", name),
+                _ => return None,
+            },
             Self::Adaptation(TwinError::Begins { name, .. }) => ("start", name),
             Self::Fixed { name, .. } => ("fixed", name),
             Self::UnknownEffect { name, .. } => ("library", name),
             Self::NoEffects => ("library", "only"),
+            Self::Twin { .. } => ("twin", ""),
             Self::Record(RecordError::Step(_)) => ("record", "step"),
             // These begin with the key, and those of a plan for each input have its name.
             Self::Plan(problem) => match problem.split([' ', ':']).next()? {

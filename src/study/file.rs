@@ -118,27 +118,39 @@ impl StudyFile {
             error,
         })?;
         let mut file = Self::parse(&text, path)?;
-        let record = &mut file.record;
-        if let Some(input) = &mut record.input {
+        if let Some(input) = &mut file.record.input {
             // A path beside a study that is named alone stays as it is: written, the study is read as the same.
             input.change_files(|file| *file = path.with_file_name(&*file));
         }
-        let grid = record.input.as_ref().map(grid_of_files).transpose()?;
+        let of_input = |(input, error): (Option<&str>, _)| {
+            let key = input.map_or("input".into(), |name| format!("input.{name}"));
+            file.located_at(("record", &key), error)
+        };
+        let grid = (file.record.input.as_ref())
+            .map(|input| grid_of_files(input).map_err(of_input))
+            .transpose()?;
         if let Some((input, step, samples)) = grid.flatten() {
-            let other = record
-                .step
-                .is_some_and(|s| (s - step).abs() > UNIFORM * step)
-                || record.samples.is_some_and(|n| n != samples);
-            if other {
-                return Err(StudyError::Plan(format!(
-                    "{}: step or samples contradict {}, which has {}, step {} s; leave them out",
-                    path.display(),
+            let RecordTable {
+                step: other_step,
+                samples: other_samples,
+                ..
+            } = file.record;
+            let contradicts = |key, own: String| {
+                let problem = format!(
+                    "{key} = {own} contradicts {}, which has {}, step {} s; leave it out",
                     input.display(),
                     count(samples, "sample"),
                     number(step)
-                )));
+                );
+                file.located(StudyError::Plan(problem))
+            };
+            if let Some(own) = other_step.filter(|own| (own - step).abs() > UNIFORM * step) {
+                return Err(contradicts("step", number(own)));
             }
-            (record.step, record.samples) = (Some(step), Some(samples));
+            if let Some(own) = other_samples.filter(|own| *own != samples) {
+                return Err(contradicts("samples", number(own as f64)));
+            }
+            (file.record.step, file.record.samples) = (Some(step), Some(samples));
         }
         Ok(file)
     }
@@ -240,11 +252,21 @@ impl StudyFile {
     }
 
     /// Adds to an error the line of the value that it is about, if the file was parsed from a text that has it.
-    pub(super) fn located(&self, error: StudyError) -> StudyError {
+    pub(crate) fn located(&self, error: StudyError) -> StudyError {
+        match error.key() {
+            Some((table, name)) => {
+                let name = name.into_owned();
+                self.located_at((table, &name), error)
+            }
+            None => error,
+        }
+    }
+
+    /// Adds to an error the line of a table's value, if the file was parsed from a text that has the table.
+    fn located_at(&self, (table, name): (&str, &str), error: StudyError) -> StudyError {
         let line = |text: &str| {
-            let (table, name) = error.key()?;
             let file = DeTable::parse(text).ok()?;
-            let of = |table| value_of(&file, table, &name);
+            let of = |table| value_of(&file, table, name);
             // What a prior leaves may be told in the other table alone.
             let value = of(table).or_else(|| (table == "prior").then(|| of("bounds"))?);
             let table = file.get_ref().get(table).map(|table| table.span().start);
@@ -440,6 +462,14 @@ mod tests {
             (
                 "twin = 'x'\n[record.input]\nu1 = {}\n",
                 "s.toml, line 3: [record] input u1 has no plan",
+            ),
+            (
+                "twin = 'x'\n[record]\n\nsamples = {}\n",
+                "s.toml, line 4: [record] samples has no value; write a number",
+            ),
+            (
+                "twin = 'x'\n[record]\ninput = ''\n",
+                "s.toml, line 3: [record] input names no file; write its path",
             ),
             (
                 "twin = 'x'\n[prior]\n\n'sensor-noise@sensor.std' = [0.3, 0.01]\n",

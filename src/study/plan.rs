@@ -286,15 +286,18 @@ fn check_one_step(path: &Path, drive: &Drive) -> Result<(), StudyError> {
     }
 }
 
+/// Step and length of records, with the first file that has them; none without a file.
+pub(super) type FilesGrid<'p> = Option<(&'p Path, f64, usize)>;
+
 /// Step and length of the records of a plan, as its files have them.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, or two of them with other steps or lengths.
+/// A file that cannot be read, or two of them with other steps or lengths; with the input that it is of, as [`PlannedInputs::files`] has it.
 pub(super) fn grid_of_files(
     plan: &PlannedInputs,
-) -> Result<Option<(&Path, f64, usize)>, StudyError> {
-    let mut grid: Option<(&Path, f64, usize)> = None;
+) -> Result<FilesGrid<'_>, (Option<&str>, StudyError)> {
+    let mut grid: FilesGrid<'_> = None;
     for (input, path) in plan.files() {
         let drive = match input {
             None => Drive::read(path).map_err(|error| match error {
@@ -302,21 +305,23 @@ pub(super) fn grid_of_files(
                     StudyError::Plan(format!("{error}; or give each input a file of its own"))
                 }
                 error => error.into(),
-            })?,
+            }),
             // The twin, whose names tell which column it is, may not be known yet.
-            Some(_) => RecordReader::default().input(path, &[])?,
+            Some(_) => RecordReader::default().input(path, &[]).map_err(Into::into),
         };
+        let drive = drive.map_err(|error| (input, error))?;
         let (step, samples) = (drive.dt(), drive.samples());
         let (first, other, length) = *grid.get_or_insert((path, step, samples));
         if (step - other).abs() > UNIFORM * other || samples != length {
-            return Err(StudyError::Plan(format!(
+            let problem = format!(
                 "{}: {}, step {} s, and {} has {length}, step {} s; inputs of one record have one step and length: write them alike",
                 path.display(),
                 count(samples, "sample"),
                 number(step),
                 first.display(),
                 number(other)
-            )));
+            );
+            return Err((input, StudyError::Plan(problem)));
         }
     }
     Ok(grid)

@@ -297,6 +297,16 @@ pub(super) fn check_shapes(file: &DeTable<'_>) -> Result<(), (usize, String)> {
     Ok(())
 }
 
+/// Returns whether a key of a table has a number.
+fn is_number(table: &str, key: &str) -> bool {
+    table == "record" && matches!(key, "step" | "samples" | "substeps" | "tolerance")
+}
+
+/// Returns whether a key of a table may have the path of a file.
+fn is_file(table: &str, key: &str) -> bool {
+    table == "input" || table == "record" && key == "input"
+}
+
 fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
     let keeps_intervals = INTERVALS.contains(&name);
     for (key, value) in table {
@@ -308,8 +318,14 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
             DeValue::Table(inner) if inner.is_empty() && name == "record" && key == "input" => {
                 "has no plan; give { levels = [low, high], hold = n } or a file, or remove it if the twin has no input"
             }
+            DeValue::Table(inner) if inner.is_empty() && is_number(name, key) => {
+                "has no value; write a number"
+            }
             DeValue::Table(inner) if inner.is_empty() && name != "features" => {
                 "is empty; remove it"
+            }
+            DeValue::String(path) if path.is_empty() && is_file(name, key) => {
+                "names no file; write its path"
             }
             DeValue::Table(inner) if keeps_intervals || matches!(name, "fixed" | "record") => {
                 let is_plan = name == "record" && key == "input";

@@ -32,8 +32,8 @@ pub(crate) use adapt::{
 pub(crate) use blocks::Blocks;
 pub(crate) use composed::{
     Acting, DeadTime, Disturbance, Entry, FittedLevels, Follows, KnownNoise, LARGEST, Law, LawPart,
-    LawPlace, LevelSource, LevelValue, NoisePart, ParameterChange, RateChange, Remember, Seen,
-    SensorNoise, SignalChange, StateLimit, TwinPart, WhiteLevel,
+    LawPlace, LevelFactors, LevelSource, LevelValue, NoisePart, ParameterChange, RateChange,
+    Remember, Seen, SensorNoise, SignalChange, StateLimit, TwinPart, WhiteLevel,
 };
 pub use composed::{Composed, ComposedBlackBox, DigitalTwin};
 pub(crate) use definitions::rates;
@@ -47,5 +47,5 @@ pub(crate) use noise::mix;
 pub use noise::{Noise, Source};
 pub(crate) use parameter::{PRIOR_DEVIATION, combination, oriented};
 pub use parameter::{Parameter, ParameterSpace, Role, Side};
-pub(crate) use points::{Layout, MOST_STATES, Points};
+pub(crate) use points::{LanePlaces, Layout, MOST_STATES, Points};
 pub use state_space::{Outliers, Outline, StateSpace};

@@ -53,6 +53,82 @@ pub(crate) struct Points<'w, N = f64> {
     pub shifts: &'w [N],
 }
 
+/// Where filters are, one a lane: with all of θ, as parts of a twin see it, and with that of its own equations.
+#[derive(Debug)]
+pub(crate) struct LanePlaces<'n> {
+    whole: Vec<Now<'n>>,
+    /// Empty where θ is the same.
+    own: Vec<Now<'n>>,
+}
+
+impl<'n> LanePlaces<'n> {
+    /// Creates those of equations with so many parameters.
+    pub fn new(whole: Vec<Now<'n>>, parameters: usize) -> Self {
+        let own = (whole.iter())
+            .filter(|now| now.theta.len() > parameters)
+            .map(|now| Now {
+                theta: &now.theta[..parameters],
+                ..*now
+            })
+            .collect();
+        Self { whole, own }
+    }
+
+    /// Creates that of a single filter, whose twin cuts θ itself.
+    pub fn of_one(whole: Now<'n>) -> Self {
+        Self {
+            whole: vec![whole],
+            own: vec![],
+        }
+    }
+
+    /// With all of θ.
+    #[inline(always)]
+    pub fn whole(&self) -> &[Now<'n>] {
+        &self.whole
+    }
+
+    /// With θ of the equations.
+    #[inline(always)]
+    pub fn own(&self) -> &[Now<'n>] {
+        match self.own.is_empty() {
+            true => &self.whole,
+            false => &self.own,
+        }
+    }
+
+    /// Calls `then` with θ of the equations and another step, where one is given.
+    pub fn own_in_step(&mut self, step: Option<f64>, then: impl FnOnce(&[Now<'n>])) {
+        let Some(step) = step else {
+            return then(self.own());
+        };
+        let own = match self.own.is_empty() {
+            true => &mut self.whole,
+            false => &mut self.own,
+        };
+        let mut before = [0.0; LANES];
+        for (now, before) in own.iter_mut().zip(&mut before) {
+            *before = std::mem::replace(&mut now.dt, step);
+        }
+        then(own);
+        for (now, before) in own.iter_mut().zip(before) {
+            now.dt = before;
+        }
+    }
+
+    /// Moves all to another row, θ kept; `go` is told the lane.
+    #[inline(always)]
+    pub fn each(&mut self, mut go: impl FnMut(usize, &mut Now<'n>)) {
+        for all in [&mut self.whole, &mut self.own] {
+            for (lane, now) in all.iter_mut().enumerate() {
+                let theta = now.theta;
+                go(lane, now);
+                now.theta = theta;
+            }
+        }
+    }
+}
+
 /// Copies one lane out.
 #[inline(always)]
 pub(super) fn gather(from: &[Lanes], lane: usize, to: &mut [f64]) {
@@ -258,9 +334,17 @@ pub(super) fn readout_lanes(
     readout: impl Fn(&Now<'_>, &mut [f64]) -> bool,
 ) -> [bool; LANES] {
     let mut changed = [false; LANES];
-    for ((lane, at), changed) in now.iter().enumerate().zip(&mut changed) {
-        for y in &mut *y {
-            *changed |= readout(at, &mut y.0[lane..=lane]);
+    for y in y.chunks_mut(FEW) {
+        let mut few = [0.0; FEW];
+        let values = &mut few[..y.len()];
+        for ((lane, at), changed) in now.iter().enumerate().zip(&mut changed) {
+            gather(y, lane, values);
+            if readout(at, values) {
+                *changed = true;
+                y.iter_mut()
+                    .zip(&*values)
+                    .for_each(|(y, value)| y.0[lane] = *value);
+            }
         }
     }
     changed

@@ -14,8 +14,8 @@ use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::axis::SMALL;
 use crate::fit::reference::Reference;
 use crate::hypothesis::search::model::Model;
+use crate::hypothesis::search::screen::looked;
 use crate::hypothesis::term::{Part, Term};
-use crate::likelihood::kalman::recoverable;
 use crate::parallel::try_each;
 use crate::study::StudyError;
 use std::sync::Arc;
@@ -69,22 +69,16 @@ fn smallest(
 ) -> Result<(Option<f64>, f64), StudyError> {
     let extended = model.extend(term)?;
     let axis = &extended.problem.axes[extended.entries[0]];
-    let mut best = (None, f64::INFINITY);
-    for start in &term.starts {
-        let mut m = start.m.clone();
-        if let Some(step) = axis.small_size().filter(|_| start.scales) {
-            m[0] = step;
+    let all = looked(model, &extended, |look, there| {
+        let own = reference.own(&reference.direction(there)).sqrt();
+        match look.scales {
+            true if own > 0.0 => Some((look.m[0].abs() * need / own, need / own * SMALL)),
+            false if own >= need => Some((look.m[0], own / need)),
+            _ => None,
         }
-        let theta = model.beside(&extended, &m);
-        let Some(there) = recoverable(extended.problem.filtered(&theta))? else {
-            continue;
-        };
-        let own = reference.own(&reference.direction(&there)).sqrt();
-        let found = match start.scales {
-            true if own > 0.0 => (m[0].abs() * need / own, need / own * SMALL),
-            false if own >= need => (m[0], own / need),
-            _ => continue,
-        };
+    })?;
+    let mut best = (None, f64::INFINITY);
+    for found in all.into_iter().flatten() {
         if found.1 < best.1 && axis.bounds.contains(found.0) {
             best = (Some(found.0), found.1);
         }

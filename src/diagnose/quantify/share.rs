@@ -5,7 +5,7 @@ use super::horizon::{HeldOutRows, Predictor, compare};
 use crate::diagnose::outcome::Shrinkage;
 use crate::diagnose::thresholds::THRESHOLDS;
 use crate::fit::climb::{Fitted, climb};
-use crate::fit::posterior::posterior;
+use crate::fit::posterior::{DrawsAsked, posterior};
 use crate::fit::problem::Problem;
 use crate::hypothesis::search::model::{Model, keys};
 use crate::likelihood::kalman::FilterError;
@@ -96,7 +96,7 @@ impl<'r> HeldOut<'r> {
         noise: Noise,
     ) -> Result<Vec<Predictor>, StudyError> {
         let fitted = std::slice::from_ref(&refit.fitted);
-        let drawn = posterior(&refit.problem, fitted, None, noise)?;
+        let drawn = posterior(&refit.problem, fitted, DrawsAsked::Usual, noise)?;
         let mut all = vec![];
         for theta in drawn.thetas.iter().take(THRESHOLDS.share_records as usize) {
             all.extend(self.predictor(model, refit.problem.of_record(0, theta))?);

@@ -5,7 +5,7 @@ use super::*;
 use crate::fit::axis::Axis;
 use crate::fit::axis::EvidencePrior;
 use crate::fit::climb::climb;
-use crate::fit::posterior::{PosteriorSample, posterior};
+use crate::fit::posterior::{DrawsAsked, PosteriorSample, posterior};
 use crate::math::log_mean;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Now, Outline, Parameter, StateSpace, Twin};
@@ -74,7 +74,13 @@ fn problem(records: &[Record], size: Option<f64>) -> Problem {
 /// Evidence corrected by draws of proposals that follow the posterior.
 fn corrected(problem: &Problem, fitted: &Fitted, seed: u64) -> Evidence {
     let noise = Noise::new(seed, "t", 0);
-    let draws = posterior(problem, std::slice::from_ref(fitted), None, noise).unwrap();
+    let draws = posterior(
+        problem,
+        std::slice::from_ref(fitted),
+        DrawsAsked::Usual,
+        noise,
+    )
+    .unwrap();
     let found = evidence(problem, fitted, &draws, noise).unwrap();
     found.unwrap()
 }

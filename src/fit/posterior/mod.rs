@@ -15,7 +15,7 @@ mod spread;
 mod table;
 
 pub(crate) use region::PosteriorRegion;
-pub(crate) use resampling::{PosteriorSample, posterior};
+pub(crate) use resampling::{DrawsAsked, PosteriorSample, posterior};
 pub(in crate::fit) use sampler::{Proposal, Round, effective};
 pub(crate) use spread::FitIntervals;
 pub use table::Posterior;

@@ -25,13 +25,23 @@ pub(crate) struct PosteriorSample {
     pub(in crate::fit) better: Option<Vec<f64>>,
 }
 
+/// Draws that are asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum DrawsAsked {
+    /// As many as fits need; uneven weights are followed once.
+    Usual,
+    /// As many, and uneven weights are followed until they hardly change.
+    Steady,
+    /// So many, most of which differ.
+    Count(usize),
+}
+
 /// Number of draws whose time is that of a fit.
-pub(in crate::fit) fn usual(problem: &Problem) -> usize {
+fn usual(problem: &Problem) -> usize {
     (BUDGET.round_samples / problem.samples()).clamp(BUDGET.least_draws, BUDGET.most_draws)
 }
 
-/// `count` draws of θ, or as many as fits need, from the posterior of likelihood and weak priors within the bounds; `fits` are ends of
-/// searches, best first.
+/// Draws of θ from the posterior of likelihood and weak priors within the bounds; `fits` are ends of searches, best first.
 ///
 /// Draws of Student densities about the tops are weighed by posterior over their mixture. Unless weights are even already, the weighted mean and
 /// covariance about each top propose a second round, as directions that the records hardly know bend; draws are taken from that in proportion
@@ -41,7 +51,7 @@ pub(in crate::fit) fn usual(problem: &Problem) -> usize {
 pub(crate) fn posterior(
     problem: &Problem,
     fits: &[Fitted],
-    count: Option<usize>,
+    asked: DrawsAsked,
     noise: Noise,
 ) -> Result<PosteriorSample, FilterError> {
     let Some(best) = fits.first() else {
@@ -60,10 +70,14 @@ pub(crate) fn posterior(
     let mut proposals = first.clone();
     let mut round = Round::new(problem, &proposals, usual, &mut source, log_prior)?;
     let is_even = round.effective() >= BUDGET.even_weights * usual as f64;
-    let (rounds, size) = match count {
-        Some(count) => (BUDGET.adaptations, usual.max(BUDGET.draws_each * count)),
-        None if is_even => (0, usual),
-        None => (1, usual),
+    let count = match asked {
+        DrawsAsked::Count(count) => count,
+        _ => usual,
+    };
+    let (rounds, size) = match asked {
+        DrawsAsked::Usual | DrawsAsked::Steady if is_even => (0, usual),
+        DrawsAsked::Usual => (1, usual),
+        _ => (BUDGET.adaptations, usual.max(BUDGET.draws_each * count)),
     };
     let mut better = (best.objective + BUDGET.better_draw, None);
     let mut look = |round: &Round| {
@@ -80,7 +94,7 @@ pub(crate) fn posterior(
         round = Round::new(problem, &proposals, size, &mut source, log_prior)?;
         look(&round);
     }
-    let taken = round.taken(count.unwrap_or(usual));
+    let taken = round.taken(count);
     let theta = |i: &usize| c.theta(round.draws[*i].as_slice());
     Ok(PosteriorSample {
         thetas: taken.iter().map(theta).collect(),

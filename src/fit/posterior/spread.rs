@@ -1,6 +1,6 @@
 //! Standard errors and intervals of a fit.
 
-use super::resampling::{PosteriorSample, posterior, usual};
+use super::resampling::{DrawsAsked, PosteriorSample, posterior};
 use crate::fit::budget::BUDGET;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
@@ -28,8 +28,8 @@ impl FitIntervals {
             true => PosteriorSample::default(),
             false => {
                 // With fewer rounds, deviations of a clipped record differ by a seventh from one set of units to another.
-                let count = Some(usual(problem));
-                posterior(problem, std::slice::from_ref(fitted), count, noise)?
+                let asked = DrawsAsked::Steady;
+                posterior(problem, std::slice::from_ref(fitted), asked, noise)?
             }
         };
         Ok(Self::new(problem, fitted, &draws.thetas, level))

@@ -9,7 +9,7 @@ mod fold;
 pub(crate) mod frequencies;
 pub(crate) mod model;
 mod rivals;
-mod screen;
+pub(crate) mod screen;
 mod traces;
 mod valleys;
 

@@ -7,7 +7,7 @@ use super::model::{Extended, Model};
 use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::reference::Reference;
 use crate::hypothesis::term::{Start, Term, marks};
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
 use crate::math::descending;
 use crate::parallel::{try_each, try_found};
 use nalgebra::DVector;
@@ -59,8 +59,10 @@ pub(crate) fn scan_from(
 ) -> Result<Vec<Promise>, FilterError> {
     let mut all = try_each(terms, |term| {
         let extended = model.extend(term)?;
-        let start = |start| promise(model, reference, &extended, start);
-        let mut starts: Vec<Beginning> = try_found(&term.starts, start)?;
+        let found = looked(model, &extended, |look, filtered| {
+            look.promise(model, reference, &extended, filtered)
+        })?;
+        let mut starts: Vec<Beginning> = found.into_iter().flatten().collect();
         descending(&mut starts, |a| a.nats);
         Ok::<_, FilterError>(Promise {
             term: term.clone(),
@@ -73,53 +75,105 @@ pub(crate) fn scan_from(
     Ok(all)
 }
 
-/// The gain of one start, and its magnitudes.
-fn promise(
+/// What `then` makes of what filters see of the last term of `extended` beside a model, from each start at which the twin works.
+pub(crate) fn looked<T>(
     model: &Model,
-    reference: &Reference,
     extended: &Extended,
-    start: &Start,
-) -> Result<Option<Beginning>, FilterError> {
+    mut then: impl FnMut(&Look, &[Filtered]) -> T,
+) -> Result<Vec<T>, FilterError> {
+    let Some(term) = extended.terms.last() else {
+        return Ok(vec![]);
+    };
     let problem = &extended.problem;
-    let first = &problem.axes[extended.entries[0]];
-    let mut m = start.m.clone();
-    let step = match first.small_size().filter(|_| start.scales) {
-        Some(step) => {
-            m[0] = step;
-            step
-        }
-        None => 1.0,
-    };
-    let theta = model.beside(extended, &m);
-    let Some(filtered) = recoverable(problem.filtered(&theta))? else {
-        return Ok(None);
-    };
-    let direction = reference.direction(&filtered);
-    if start.scales {
-        let (low, high) = (first.bounds.low() / step, first.bounds.high() / step);
-        let gain = reference.gain(&direction, (low.min(high), low.max(high)));
-        m[0] = gain.alpha * step;
-        return Ok((gain.nats > 0.0).then(|| Beginning {
-            nats: gain.nats,
-            m,
-            scales: true,
-            answer: reference.answer(&direction, gain.alpha),
-        }));
+    let looks: Vec<Look> = (term.starts.iter())
+        .map(|start| Look::of(model, extended, start))
+        .collect();
+    // A little of what does nothing is told from nothing by its bits, which are others side by side.
+    if looks.iter().any(|look| look.scales) {
+        let one = |look: &Look| {
+            let filtered = recoverable(problem.filtered(&look.theta))?;
+            Ok(filtered.map(|filtered| then(look, &filtered)))
+        };
+        return looks
+            .iter()
+            .map(one)
+            .filter_map(Result::transpose)
+            .collect();
     }
-    let value: f64 = filtered.iter().map(|f| f.log_likelihood).sum();
-    let gain = reference.gain(&direction, (0.0, 1.5));
-    let better = value - model.fitted.log_likelihood;
-    // Secants of noise promise hundreds of nats on records of the twin itself.
-    let nats = match extended.terms.last().is_some_and(|term| term.is_noise()) {
-        true => better,
-        false => better.max(gain.nats),
-    };
-    Ok(Some(Beginning {
-        nats,
-        m,
-        scales: false,
-        answer: reference.answer(&direction, 1.0),
-    }))
+    let thetas: Vec<Vec<f64>> = looks.iter().map(|look| look.theta.clone()).collect();
+    let found = problem.each_filtered(&thetas, |i, filtered| then(&looks[i], &filtered))?;
+    Ok(found.into_iter().flatten().collect())
+}
+
+/// A little of a term beside a model, or another value where that has no size.
+pub(crate) struct Look {
+    /// Magnitudes.
+    pub m: Vec<f64>,
+    /// True where less of the first magnitude is less of the term.
+    pub scales: bool,
+    /// First magnitude of a little.
+    step: f64,
+    /// θ of the model with it.
+    theta: Vec<f64>,
+}
+
+impl Look {
+    /// From a start of the last term of `extended`.
+    fn of(model: &Model, extended: &Extended, start: &Start) -> Self {
+        let first = &extended.problem.axes[extended.entries[0]];
+        let mut m = start.m.clone();
+        let step = match first.small_size().filter(|_| start.scales) {
+            Some(step) => {
+                m[0] = step;
+                step
+            }
+            None => 1.0,
+        };
+        Self {
+            theta: model.beside(extended, &m),
+            scales: start.scales,
+            step,
+            m,
+        }
+    }
+
+    /// The gain of the start by what the filter saw there; `None` where there is none.
+    fn promise(
+        &self,
+        model: &Model,
+        reference: &Reference,
+        extended: &Extended,
+        filtered: &[Filtered],
+    ) -> Option<Beginning> {
+        let direction = reference.direction(filtered);
+        let mut m = self.m.clone();
+        if self.scales {
+            let bounds = &extended.problem.axes[extended.entries[0]].bounds;
+            let (low, high) = (bounds.low() / self.step, bounds.high() / self.step);
+            let gain = reference.gain(&direction, (low.min(high), low.max(high)));
+            m[0] = gain.alpha * self.step;
+            return (gain.nats > 0.0).then(|| Beginning {
+                nats: gain.nats,
+                m,
+                scales: true,
+                answer: reference.answer(&direction, gain.alpha),
+            });
+        }
+        let value: f64 = filtered.iter().map(|f| f.log_likelihood).sum();
+        let gain = reference.gain(&direction, (0.0, 1.5));
+        let better = value - model.fitted.log_likelihood;
+        // Secants of noise promise hundreds of nats on records of the twin itself.
+        let nats = match extended.terms.last().is_some_and(|term| term.is_noise()) {
+            true => better,
+            false => better.max(gain.nats),
+        };
+        Some(Beginning {
+            nats,
+            m,
+            scales: false,
+            answer: reference.answer(&direction, 1.0),
+        })
+    }
 }
 
 /// Evidence of an unknown function to second order, before any refit.

@@ -1,6 +1,7 @@
 //! Result of a filter over a record.
 
 use super::gaussian::{Belief, Gaussian};
+use super::likelihood::LOG_TWO_PI;
 use super::order::Order;
 use super::pass::{Innovation, Pass, Sink};
 use super::size::Any;
@@ -38,6 +39,27 @@ impl Filtered {
             standardised: Signal::zeros((samples, p)),
             states: states.map(|n| States::new(samples, n)),
         }
+    }
+
+    /// What a filter saw of one output, from the innovation and its variance row by row.
+    pub(super) fn of_one_output(
+        log_likelihood: f64,
+        rows: impl Iterator<Item = (f64, f64)>,
+        outputs: &Signal,
+    ) -> Self {
+        let mut filtered = Self::new(outputs.nrows(), 1, None);
+        filtered.log_likelihood = log_likelihood;
+        for (k, (innovation, variance)) in rows.enumerate() {
+            let standardised = innovation / variance.sqrt();
+            filtered.innovations[[k, 0]] = innovation;
+            filtered.covariances[[k, 0, 0]] = variance;
+            filtered.standardised[[k, 0]] = standardised;
+            if !outputs[[k, 0]].is_nan() {
+                let square = standardised * standardised;
+                filtered.log_densities[k] = -0.5 * (LOG_TWO_PI + variance.ln() + square);
+            }
+        }
+        filtered
     }
 
     /// Variance of each innovation (N × p).

@@ -19,7 +19,7 @@ use super::number::{Buffers, Call, FilterNumber};
 use super::size::{Buffer, Size};
 use super::{Kalman, Method, linearised};
 use crate::math::{Condition, Kernel, Number, widest};
-use crate::twin::{Composed, Interval, Now, Points};
+use crate::twin::{Composed, Interval, LanePlaces, Points};
 use std::f64::consts::SQRT_2;
 
 /// √3: points of the three-point Gauss–Hermite rule, in standard deviations.
@@ -106,7 +106,7 @@ impl<'a, S: Size, N: FilterNumber> Moments<'a, S, N> {
     #[inline(always)]
     pub fn predict(
         &mut self,
-        now: &[Now<'_>],
+        now: &LanePlaces<'_>,
         q: &[N],
         root: Columns<'_, N>,
         (mean, cov): Moment<'_, N>,
@@ -210,7 +210,7 @@ impl<'a, S: Size, N: FilterNumber> Moments<'a, S, N> {
     #[inline(always)]
     pub fn observe(
         &mut self,
-        now: &[Now<'_>],
+        now: &LanePlaces<'_>,
         mean: &[N],
         root: Columns<'_, N>,
         y: &mut [N],

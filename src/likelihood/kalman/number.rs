@@ -1,7 +1,7 @@
 //! Calls of the twin by a filter, whose numbers are one or those of several filters side by side. The twin's equations are plain f64.
 
 use crate::math::{Lanes, Mask, Number};
-use crate::twin::{Composed, Now, Points, Workspace};
+use crate::twin::{Composed, LanePlaces, LevelFactors, Points, Workspace};
 
 /// A number that a filter computes with.
 pub(super) trait FilterNumber: Number {
@@ -10,18 +10,23 @@ pub(super) trait FilterNumber: Number {
     /// Outputs of points of `n` states each.
     fn observe(call: Call<'_, '_>, n: usize, points: &[Self], outputs: &mut [Self]);
     /// Noise levels at the states `x`; both come with any numbers.
-    fn noise(at: Asked<'_, '_>, x: &[Self], process: &mut [Self], measurement: &mut [Self]);
+    fn noise(
+        asked: (&Composed, &mut LanePlaces<'_>, &LevelFactors<Self>),
+        x: &[Self],
+        process: &mut [Self],
+        measurement: &mut [Self],
+    );
     /// Puts outputs through the readout; the lanes in which it changed any.
     fn readout(at: Asked<'_, '_>, outputs: &mut [Self]) -> Self::Condition;
 }
 
-/// A twin, and where its filters are: one view for each lane in use.
-pub(super) type Asked<'c, 'n> = (&'c Composed, &'c [Now<'n>]);
+/// A twin, and where its filters are.
+pub(super) type Asked<'c, 'n> = (&'c Composed, &'c LanePlaces<'n>);
 
 /// The same, with buffers.
 pub(super) struct Call<'c, 'n> {
     pub twin: &'c Composed,
-    pub now: &'c [Now<'n>],
+    pub now: &'c LanePlaces<'n>,
     pub buffers: &'c mut Buffers,
 }
 
@@ -52,21 +57,26 @@ impl Buffers {
 impl FilterNumber for f64 {
     #[inline(always)]
     fn advance(call: Call<'_, '_>, points: Points<'_, Self>) -> bool {
-        (call.twin).advance(&call.now[0], points, &mut call.buffers.work)
+        (call.twin).advance(&call.now.whole()[0], points, &mut call.buffers.work)
     }
     #[inline(always)]
     fn observe(call: Call<'_, '_>, _: usize, points: &[f64], outputs: &mut [f64]) {
-        call.twin.observe(&call.now[0], points, outputs);
+        call.twin.observe(&call.now.whole()[0], points, outputs);
     }
     #[inline(always)]
-    fn noise((twin, now): Asked<'_, '_>, x: &[f64], process: &mut [f64], measurement: &mut [f64]) {
+    fn noise(
+        (twin, now, factors): (&Composed, &mut LanePlaces<'_>, &LevelFactors<f64>),
+        x: &[f64],
+        process: &mut [f64],
+        measurement: &mut [f64],
+    ) {
         process.fill(0.0);
         measurement.fill(0.0);
-        twin.noise(&now[0], x, process, measurement);
+        twin.noise_by(factors, &now.whole()[0], x, (process, measurement));
     }
     #[inline(always)]
     fn readout((twin, now): Asked<'_, '_>, outputs: &mut [f64]) -> bool {
-        twin.readout(&now[0], outputs)
+        twin.readout(&now.whole()[0], outputs)
     }
 }
 
@@ -86,12 +96,12 @@ impl FilterNumber for Lanes {
     }
     #[inline(always)]
     fn noise(
-        (twin, now): Asked<'_, '_>,
+        (twin, now, factors): (&Composed, &mut LanePlaces<'_>, &LevelFactors<Self>),
         x: &[Self],
         process: &mut [Self],
         measurement: &mut [Self],
     ) {
-        twin.noise_lanes(now, x, process, &mut measurement[0]);
+        twin.noise_lanes(factors, now, x, (process, &mut measurement[0]));
     }
     #[inline(always)]
     fn readout((twin, now): Asked<'_, '_>, outputs: &mut [Self]) -> Mask {

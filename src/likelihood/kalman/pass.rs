@@ -10,7 +10,7 @@ use super::size::{Any, Buffer, Size};
 use super::update::{MeasuredRow, Readings, Update};
 use super::{FilterError, Kalman};
 use crate::math::{Condition, Number};
-use crate::twin::{Acting, Now, SimulationError};
+use crate::twin::{Acting, LanePlaces, LevelFactors, Now, SimulationError};
 
 /// Innovation of one row.
 pub(super) struct Innovation<'w, N = f64> {
@@ -126,7 +126,8 @@ pub(super) struct Pass<'k, S: Size, N: FilterNumber> {
     /// The first job's; so is the order.
     kalman: &'k Kalman<'k>,
     order: &'k Order<'k>,
-    now: Vec<Now<'k>>,
+    now: LanePlaces<'k>,
+    factors: LevelFactors<N>,
     moments: Moments<'k, S, N>,
     update: Update<S, N>,
     /// Standard deviations of process and measurement noise.
@@ -190,12 +191,19 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 }
             });
         }
+        let now: Vec<Now<'_>> = (jobs.iter()).map(|job| job.acting.at(0)).collect();
+        let now = match N::LANES {
+            1 => LanePlaces::of_one(now[0]),
+            _ => LanePlaces::new(now, kalman.twin.own_parameters()),
+        };
         Self {
             size,
             jobs,
             kalman,
             order,
-            now: (jobs.iter()).map(|job| job.acting.at(0)).collect(),
+            factors: (kalman.twin)
+                .level_factors(|lane| jobs[held_by(lane, jobs.len())].acting.at(0).theta),
+            now,
             copy: FilterState::zero(n),
             row: 0,
             state: FilterState::zero(n),
@@ -279,9 +287,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
     /// Inputs of sample k, and noise levels there at the mean of the state.
     #[inline(always)]
     fn go_to(&mut self, k: usize, state: &FilterState<S, N>) {
-        for (now, job) in self.now.iter_mut().zip(self.jobs) {
-            job.acting.go_to(k, now);
-        }
+        let jobs = self.jobs;
+        self.now.each(|lane, now| jobs[lane].acting.go_to(k, now));
         self.set_noise(state);
     }
 
@@ -296,7 +303,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         // Of a copy: what a call has seen leaves the registers.
         let x = &mut self.copy.mean.numbers_mut()[..n];
         x.copy_from_slice(state.belief(n).mean);
-        N::noise((&self.kalman.twin, &self.now), x, q, r);
+        let asked = (&self.kalman.twin, &mut self.now, &self.factors);
+        N::noise(asked, x, q, r);
     }
 
     /// Puts row i into the state.
@@ -329,7 +337,9 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         self.valid = before & is_finite;
         if !self.valid.any() {
             return Err(match before.any() && self.moments.fault().is_none() {
-                true => FilterError::Diverged { at: self.now[0].t },
+                true => FilterError::Diverged {
+                    at: self.now.whole()[0].t,
+                },
                 false => self.failure(state),
             });
         }
@@ -471,7 +481,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
 
     #[inline(always)]
     fn failure(&self, state: &FilterState<S, N>) -> FilterError {
-        let at = self.now[0].t;
+        let at = self.now.whole()[0].t;
         if let Some(fault) = self.moments.fault() {
             return FilterError::Simulation(SimulationError::Failed(fault.into()));
         }
@@ -495,9 +505,8 @@ impl<N: FilterNumber> Pass<'_, Any, N> {
     fn run_to_first_row(mut self, steps: usize, state: &mut FilterState<Any, N>) {
         let mut root = Root::new(self.size.states());
         for i in 0..steps {
-            for (now, job) in self.now.iter_mut().zip(self.jobs) {
-                *now = job.acting.before(i);
-            }
+            let jobs = self.jobs;
+            (self.now).each(|lane, now| *now = jobs[lane].acting.before(i));
             self.set_noise(state);
             self.carry(0, state, &mut root, &mut ());
         }

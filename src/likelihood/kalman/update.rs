@@ -288,7 +288,8 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
         let covariance = self.covariance.numbers();
         let bent = bent.select(N::all(1.0), N::ZERO);
         let (twin, now) = row.at;
-        for (lane, now) in now.iter().enumerate().filter(|(l, _)| bent.lane(*l) != 0.0) {
+        let lanes = now.whole().iter().enumerate();
+        for (lane, now) in lanes.filter(|(lane, _)| bent.lane(*lane) != 0.0) {
             let mut again: Vec<f64> = row.y.iter().map(|y| y.lane(lane)).collect();
             twin.readout(now, &mut again);
             for j in 0..p {

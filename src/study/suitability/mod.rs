@@ -98,8 +98,16 @@ impl Study {
                 0 => space.centre(),
                 _ => space.draw_prior(noise),
             };
-            let run = self.twin.simulate(&theta, record.drive(), noise).ok();
-            runs.extend(run.filter(|run| run.iter().all(|v| v.is_finite())));
+            match self.twin.simulate(&theta, record.drive(), noise) {
+                Err(error) if !error.costs_one_run() => {
+                    findings.push(Finding::failure("scale", error.to_string()));
+                    return Ok(Suitability {
+                        findings,
+                        parameters: vec![],
+                    });
+                }
+                run => runs.extend(run.ok().filter(|run| run.iter().all(|v| v.is_finite()))),
+            }
             stage.tick()?;
         }
         findings.extend(channels::check(self, &record, planned_drive, &runs));

@@ -27,6 +27,7 @@ pub use black_box::ComposedBlackBox;
 pub use digital_twin::DigitalTwin;
 pub(in crate::twin) use digital_twin::FREE_RUNS;
 pub(crate) use known_noise::{KnownNoise, NoisePart, SensorNoise, WhiteLevel};
+pub(crate) use noise::LevelFactors;
 pub(crate) use part::{
     Disturbance, Entry, FittedLevels, Follows, LARGEST, Law, LawPart, LawPlace, LevelSource,
     LevelValue, ParameterChange, RateChange, Remember, Seen, SignalChange, StateLimit, TwinPart,

@@ -4,7 +4,7 @@ use super::parts::Theta;
 use super::{Composed, Entry, Law, TwinPart};
 use crate::math::{LANES, Lanes};
 use crate::twin::points::{
-    Layout, Points, advance_together, lanes_one_by_one, observe_lanes, readout_lanes,
+    LanePlaces, Layout, Points, advance_together, lanes_one_by_one, observe_lanes, readout_lanes,
 };
 use crate::twin::{EventCalls, Now, Workspace};
 
@@ -16,12 +16,12 @@ impl Composed {
 
     /// Constrains points after a step, before their boxes.
     pub fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.resolved(now, |now| self.bound(now, x));
+        self.resolved(now, |now| self.bound(now, None, x));
     }
 
     /// Moves what changes at samples only: memories, before the motion starts.
     pub(crate) fn update(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.resolved(now, |now| self.remember(now, x));
+        self.resolved(now, |now| self.remember(now, None, x));
     }
 
     /// Points that are called together: all, or each where parameters follow states.
@@ -43,19 +43,24 @@ impl Composed {
     }
 
     fn rates(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        let (at, together) = (self.layout(), self.together(x.len()));
+        let together = self.together(x.len());
         for (x, dx) in x.chunks_exact(together).zip(dx.chunks_exact_mut(together)) {
-            if at.states < at.stride {
-                for dx in dx.chunks_exact_mut(at.stride) {
-                    dx[at.states..].fill(0.0);
-                }
+            self.inside(now, Some(x), |own| self.rates_inside(now, own, x, dx));
+        }
+    }
+
+    /// Rates at the twin's own time and θ.
+    #[inline]
+    fn rates_inside(&self, now: &Now<'_>, own: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        let at = self.layout();
+        if at.states < at.stride {
+            for dx in dx.chunks_exact_mut(at.stride) {
+                dx[at.states..].fill(0.0);
             }
-            self.inside(now, Some(x), |own| {
-                self.own.drift_points(own, at, x, dx);
-                if self.parts.acts.on_rates {
-                    self.push(now, own, x, dx);
-                }
-            });
+        }
+        self.own.drift_points(own, at, x, dx);
+        if self.parts.acts.on_rates {
+            self.push(now, own, x, dx);
         }
     }
 
@@ -89,7 +94,7 @@ impl Composed {
         }
     }
 
-    fn bound(&self, now: &Now<'_>, x: &mut [f64]) {
+    fn bound(&self, now: &Now<'_>, own: Option<&Now<'_>>, x: &mut [f64]) {
         let at = self.layout();
         if self.parts.acts.on_limits {
             for added in self.parts.list.iter().rev() {
@@ -100,10 +105,12 @@ impl Composed {
                 }
             }
         }
-        self.each_inside(now, x, |own, x| self.own.constrain_points(own, at, x));
+        self.each_inside((now, own), x, |own, x| {
+            self.own.constrain_points(own, at, x)
+        });
     }
 
-    fn remember(&self, now: &Now<'_>, x: &mut [f64]) {
+    fn remember(&self, now: &Now<'_>, own: Option<&Now<'_>>, x: &mut [f64]) {
         let at = self.layout();
         if self.parts.acts.in_memories {
             self.follow(now, x);
@@ -112,7 +119,7 @@ impl Composed {
             self.remember_signals(now, x);
         }
         if self.parts.moves(now, 0) {
-            self.each_inside(now, x, |own, x| self.own.update_points(own, at, x));
+            self.each_inside((now, own), x, |own, x| self.own.update_points(own, at, x));
         }
         if !self.parts.acts.in_disturbances {
             return;
@@ -127,9 +134,17 @@ impl Composed {
         }
     }
 
-    /// Changes points, θ being as it is beside the states before.
+    /// Changes points, θ being as it is beside the states before; the twin's own time and θ may be known.
     #[inline]
-    fn each_inside(&self, now: &Now<'_>, x: &mut [f64], change: impl Fn(&Now<'_>, &mut [f64])) {
+    fn each_inside(
+        &self,
+        (now, own): (&Now<'_>, Option<&Now<'_>>),
+        x: &mut [f64],
+        change: impl Fn(&Now<'_>, &mut [f64]),
+    ) {
+        if let Some(own) = own {
+            return change(own, x);
+        }
         if !self.parts.acts.by_states {
             return self.inside(now, None, |own| change(own, x));
         }
@@ -142,15 +157,26 @@ impl Composed {
     /// Carries one state over a step, without noise and limits: memories, then motion.
     pub(crate) fn step(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
         self.resolved(now, |now| {
-            self.remember(now, x);
-            self.carry(self.states(), now, x, work);
+            self.remember(now, None, x);
+            self.carry(self.states(), (now, None), x, work);
         });
     }
 
-    /// Carries points of `n` states each over a step, with the twin's events.
+    /// Carries points of `n` states each over a step, with the twin's events; its own time and θ at the begin may be known.
     #[inline(always)]
-    fn carry(&self, n: usize, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
-        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.rates(now, x, dx);
+    fn carry(
+        &self,
+        n: usize,
+        (now, own): (&Now<'_>, Option<&Now<'_>>),
+        x: &mut [f64],
+        work: &mut Workspace,
+    ) {
+        // One step of Euler's rule has its rates there alone.
+        let own = own.filter(|_| work.is_plain());
+        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| match own {
+            Some(own) => self.rates_inside(now, own, x, dx),
+            None => self.rates(now, x, dx),
+        };
         let calls = EventCalls {
             list: &self.parts.outline.events,
             states: self.parts.states,
@@ -169,96 +195,86 @@ impl Composed {
                 };
                 return self.own.advance_points(&own, points, work);
             }
-            // Loops of known length, for the sizes of most twins.
-            match points.shifts.len() {
-                2 => self.advance_together(2, now, points, work),
-                3 => self.advance_together(3, now, points, work),
-                4 => self.advance_together(4, now, points, work),
-                n => self.advance_together(n, now, points, work),
+            if self.parts.acts.by_states {
+                return self.advance_sized((now, None), points, work);
             }
+            self.inside(now, None, |own| {
+                self.advance_sized((now, Some(own)), points, work)
+            })
         })
+    }
+
+    fn advance_sized(
+        &self,
+        at: (&Now<'_>, Option<&Now<'_>>),
+        points: Points<'_>,
+        work: &mut Workspace,
+    ) -> bool {
+        // Loops of known length, for the sizes of most twins.
+        match points.shifts.len() {
+            2 => self.advance_together(2, at, points, work),
+            3 => self.advance_together(3, at, points, work),
+            4 => self.advance_together(4, at, points, work),
+            n => self.advance_together(n, at, points, work),
+        }
     }
 
     #[inline(always)]
     fn advance_together(
         &self,
         n: usize,
-        now: &Now<'_>,
+        (now, own): (&Now<'_>, Option<&Now<'_>>),
         points: Points<'_>,
         work: &mut Workspace,
     ) -> bool {
         let carry = |x: &mut [f64], work: &mut Workspace| {
-            self.remember(now, x);
-            self.carry(n, now, x, work);
+            self.remember(now, own, x);
+            self.carry(n, (now, own), x, work);
         };
-        advance_together(n, points, work, carry, |x| self.bound(now, x))
+        advance_together(n, points, work, carry, |x| self.bound(now, own, x))
     }
 
     /// As [`advance`](Self::advance), of several filters, one a lane; `one` holds points and shifts of one of them.
     pub(crate) fn advance_lanes(
         &self,
-        now: &[Now<'_>],
+        at: &LanePlaces<'_>,
         points: Points<'_, Lanes>,
         one: (&mut [f64], &mut [f64]),
         work: &mut Workspace,
     ) -> [bool; LANES] {
         if self.parts.acts.leave_motion() {
-            return self.lanes_alone(now, |now| self.own.advance_lanes(now, points, one, work));
+            return self.own.advance_lanes(at.own(), points, one, work);
         }
         let advance = |now: &Now<'_>, points: Points<'_>| self.advance(now, points, work);
-        lanes_one_by_one(points.shifts.len(), now, points, one, advance)
+        lanes_one_by_one(points.shifts.len(), at.whole(), points, one, advance)
     }
 
     /// One output of the points, `n` states each, of several filters, one a lane; `buffer` holds those of one of them.
     pub(crate) fn observe_lanes(
         &self,
-        now: &[Now<'_>],
+        at: &LanePlaces<'_>,
         n: usize,
         x: &[Lanes],
         y: &mut [Lanes],
         buffer: &mut [f64],
     ) {
         if self.parts.acts.leave_motion() && !self.parts.acts.on_outputs {
-            return self.lanes_alone(now, |now| self.own.observe_lanes(now, n, x, y, buffer));
+            return self.own.observe_lanes(at.own(), n, x, y, buffer);
         }
         let observe = |now: &Now<'_>, x: &[f64], y: &mut [f64]| self.observe(now, x, y);
-        observe_lanes(n, now, x, y, buffer, observe);
+        observe_lanes(n, at.whole(), x, y, buffer, observe);
     }
 
     /// Puts values of one output of several filters, one a lane, through the readout; returns the lanes that it changed.
-    pub(crate) fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES] {
+    pub(crate) fn readout_lanes(&self, at: &LanePlaces<'_>, y: &mut [Lanes]) -> [bool; LANES] {
         if self.parts.leave_readings() {
-            return self.lanes_alone(now, |now| self.own.readout_lanes(now, y));
+            return self.own.readout_lanes(at.own(), y);
         }
-        readout_lanes(now, y, |now, y| self.readout(now, y))
+        readout_lanes(at.whole(), y, |now, y| self.readout(now, y))
     }
 
-    /// Calls `then` with the twin's own θ in each lane; `now` has all of it.
-    #[inline]
-    fn lanes_alone<R>(&self, now: &[Now<'_>], then: impl FnOnce(&[Now<'_>]) -> R) -> R {
-        self.lanes_in_step(now, None, then)
-    }
-
-    /// The same with another step, where one is given.
-    #[inline]
-    pub(super) fn lanes_in_step<R>(
-        &self,
-        now: &[Now<'_>],
-        step: Option<f64>,
-        then: impl FnOnce(&[Now<'_>]) -> R,
-    ) -> R {
-        let own = self.parts.parameters;
-        if self.parts.entries() == own && step.is_none() {
-            return then(now);
-        }
-        let nows: [Now<'_>; LANES] = std::array::from_fn(|lane| {
-            let at = now.get(lane).unwrap_or(&now[0]);
-            Now {
-                theta: &at.theta[..own],
-                dt: step.unwrap_or(at.dt),
-                ..*at
-            }
-        });
-        then(&nows[..now.len()])
+    /// Number of parameters of the equations alone.
+    pub(crate) fn own_parameters(&self) -> usize {
+        self.parts.parameters
     }
 }

@@ -302,6 +302,11 @@ impl Parts {
         !(self.acts.on_readings || self.acts.on_parameters) && self.delays.is_empty()
     }
 
+    /// Returns whether any part changes noise levels.
+    pub fn changes_levels(&self) -> bool {
+        self.acts.on_noise || self.acts.in_levels
+    }
+
     /// Returns the laws.
     pub fn laws(&self) -> impl Iterator<Item = &LawPart> {
         self.list.iter().filter_map(|added| match &added.part {

@@ -5,8 +5,8 @@ use crate::likelihood::kalman::{FilterSettings, Kalman};
 use crate::math::Lanes;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{
-    Adaptation, Hold, Integrator, Interval, Noise, NoiseLevel, Now, Outline, Parameter, StartLevel,
-    StateSpace, Stepping, Twin, adapt, fix,
+    Adaptation, Hold, Integrator, Interval, LanePlaces, Noise, NoiseLevel, Now, Outline, Parameter,
+    StartLevel, StateSpace, Stepping, Twin, adapt, fix,
 };
 use crate::twins::CascadedTanks;
 
@@ -251,7 +251,9 @@ fn noise_is_the_same_side_by_side() {
                 .map(|theta| Now::new(7.0, 2.0, &[3.0], theta))
                 .collect();
             let (mut q, mut r) = (vec![Lanes([1.0; 8]); n], Lanes([1.0; 8]));
-            twin.noise_lanes(&now, &x, &mut q, &mut r);
+            let factors = twin.level_factors(|lane| now.get(lane).unwrap_or(&now[0]).theta);
+            let mut at = LanePlaces::new(now.clone(), twin.own_parameters());
+            twin.noise_lanes(&factors, &mut at, &x, (&mut q, &mut r));
             for (lane, now) in now.iter().enumerate() {
                 let (mut process, mut measurement) = (vec![0.0; n], vec![0.0]);
                 let x: Vec<f64> = states(lane).collect();

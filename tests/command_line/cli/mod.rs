@@ -485,9 +485,21 @@ fn wrong_studies_are_refused_with_file_and_line() {
     );
     check(
         "twin = 'van-der-pol'\n[start]\nx1 = 'estimate'\n",
-        &["start.x1", "[prior]"],
+        &["line 3", "start.x1", "[prior]"],
     );
-    check("twin = 'reactor'\n", &["\"reactor\"", "tanks"]);
+    check(
+        "twin = 'van-der-pol'\n[noise]\n\ny = 'estimate'\n",
+        &["line 4", "noise.y", "[prior]"],
+    );
+    check("\ntwin = 'reactor'\n", &["line 2", "\"reactor\"", "tanks"]);
+    check(
+        "twin = 'tanks'\n[record]\n\ninput = 'none.csv'\n",
+        &["line 4", "none.csv"],
+    );
+    check(
+        "twin = 'tanks'\n[record.input]\n\nu = 'none.csv'\n",
+        &["line 4", "none.csv"],
+    );
     check(
         "twin = 'tanks'\n[features]\nkind = 'arma'\n",
         &["line 3", "arma"],
@@ -593,7 +605,7 @@ fn a_study_with_an_input_file_has_its_step() {
     );
     refused(
         &["check", "--study", &other],
-        &["contradict", "60 samples, step 1 s"],
+        &["line 3", "step = 2 contradicts", "60 samples, step 1 s"],
     );
 }
 

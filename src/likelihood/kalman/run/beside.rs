@@ -8,7 +8,7 @@ use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
 use crate::likelihood::kalman::run::AnyPass;
 use crate::likelihood::kalman::size::{Any, Size, with_size};
 use crate::likelihood::kalman::update::Readings;
-use crate::likelihood::kalman::{FilterError, Kalman, Method, recoverable};
+use crate::likelihood::kalman::{FilterError, Filtered, Kalman, Method, recoverable};
 use crate::math::{Kernel, LANES, Lanes, is_wide, wide};
 use crate::parallel::try_each;
 use crate::twin::MOST_STATES;
@@ -126,28 +126,63 @@ impl Kalman<'_> {
         &self,
         thetas: &[Vec<f64>],
     ) -> Result<Vec<Option<f64>>, FilterError> {
-        let alone = |theta: &Vec<f64>| recoverable(self.log_likelihood(theta));
+        let alone = |theta: &[f64]| self.log_likelihood(theta);
+        self.beside_or_alone(thetas, alone, |held| {
+            let mut pass = held.pass();
+            pass.run_to(self.record.samples(), &mut ()).ok()?;
+            let values = pass.log_likelihood();
+            let lanes = 0..held.lanes.len();
+            Some(lanes.map(|i| held.log_likelihood(i, &values)).collect())
+        })
+    }
+
+    /// As [`log_likelihoods`](Self::log_likelihoods), with all that the filters saw but the states.
+    pub(crate) fn filter_all(
+        &self,
+        thetas: &[Vec<f64>],
+    ) -> Result<Vec<Option<Filtered>>, FilterError> {
+        let alone = |theta: &[f64]| self.filter(theta);
+        self.beside_or_alone(thetas, alone, |held| {
+            let (mut pass, mut rows) = (held.pass(), LaneRows::default());
+            pass.run_to(self.record.samples(), &mut rows).ok()?;
+            let values = pass.log_likelihood();
+            let filtered = |i| {
+                let value = held.log_likelihood(i, &values)?;
+                let lane = held.lane(i)?;
+                let rows = (rows.0.iter()).map(|[e, s]| (e.0[lane], s.0[lane]));
+                Some(Filtered::of_one_output(value, rows, self.record.outputs()))
+            };
+            Some((0..held.lanes.len()).map(filtered).collect())
+        })
+    }
+
+    /// What is found at several θ, on all cores: `together` has that of each filter that has a lane, where they can run side by side.
+    fn beside_or_alone<T: Send>(
+        &self,
+        thetas: &[Vec<f64>],
+        alone: impl Fn(&[f64]) -> Result<T, FilterError> + Sync,
+        together: impl Fn(&SideBySide<'_>) -> Option<Vec<Option<T>>> + Sync,
+    ) -> Result<Vec<Option<T>>, FilterError> {
+        let alone = |theta: &Vec<f64>| recoverable(alone(theta));
         if !self.fits_lanes() {
             return try_each(thetas, alone);
         }
-        let some = |thetas: &[Vec<f64>]| -> Result<Vec<Option<f64>>, FilterError> {
+        let some = |thetas: &[Vec<f64>]| -> Result<Vec<Option<T>>, FilterError> {
             let all: Vec<_> = thetas.iter().map(|theta| (self, &theta[..])).collect();
             let found = match all.len() {
                 0..=TOO_FEW => None,
-                _ => SideBySide::of(&all).and_then(|held| {
-                    let mut pass = held.pass();
-                    pass.run_to(self.record.samples(), &mut ()).ok()?;
-                    let values = pass.log_likelihood();
-                    let each = (0..all.len()).map(|i| held.log_likelihood(i, &values));
-                    Some(each.collect::<Vec<_>>())
-                }),
+                _ => SideBySide::of(&all).and_then(|held| together(&held)),
             };
-            let of_lane = |i: usize| found.as_ref().and_then(|values| values[i]);
-            (thetas.iter().enumerate())
-                .map(|(i, theta)| of_lane(i).map_or_else(|| alone(theta), |value| Ok(Some(value))))
+            let mut found = found.into_iter().flatten();
+            (thetas.iter())
+                .map(|theta| match found.next().flatten() {
+                    Some(value) => Ok(Some(value)),
+                    None => alone(theta),
+                })
                 .collect()
         };
-        Ok(try_each(thetas.chunks(LANES), some)?.concat())
+        let found = try_each(thetas.chunks(LANES), some)?;
+        Ok(found.into_iter().flatten().collect())
     }
 
     /// Returns whether lanes can hold this filter beside another: of one twin that begins at the first row, with as many rows, the same ones

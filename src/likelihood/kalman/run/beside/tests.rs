@@ -63,6 +63,17 @@ fn agree(twin: impl Into<Composed>, centre: &[f64], record: &Record, settings: &
             assert!((s.0[lane] / variance - 1.0).abs() < 1e-10);
         }
     }
+    let near = |found: &[f64], expected: &[f64]| {
+        let mut pairs = found.iter().zip(expected);
+        pairs.all(|(a, b)| (a - b).abs() < 1e-7 * b.abs().max(1.0))
+    };
+    for (found, theta) in kalman.filter_all(&thetas).unwrap().iter().zip(&thetas) {
+        let (found, scalar) = (found.as_ref().unwrap(), kalman.filter(theta).unwrap());
+        assert!(near(&found.log_densities, &scalar.log_densities));
+        let standardised = [found, &scalar].map(|of| of.standardised.as_slice().unwrap());
+        assert!(near(standardised[0], standardised[1]));
+        assert_eq!(found.log_densities.len(), record.samples());
+    }
 }
 
 #[test]
