@@ -130,6 +130,24 @@ fn ratios(clock: &Clock) {
         println!(
             "filter: ratios, tanks with {name}: {augmented:.1} µs over {bare:.1} µs: {ratio:.2}"
         );
+        let score = |of: &Kalman<'_>, theta: &[f64]| {
+            let coordinates = Coordinates::new(of.parameters());
+            assert!(black_box(Score::forward(of, black_box(theta), &coordinates)).is_ok());
+        };
+        let [bare, augmented] = in_turn([&mut || score(&kalman, &TANKS), &mut || {
+            score(&grown, &theta)
+        }]);
+        // Passes of a score: one, and one a parameter.
+        let each = [
+            bare / (1 + TANKS.len()) as f64,
+            augmented / (1 + theta.len()) as f64,
+        ];
+        println!(
+            "filter: ratios, score with {name}, a pass: {:.1} µs over {:.1} µs: {:.2}",
+            each[1],
+            each[0],
+            each[1] / each[0]
+        );
     }
     for n in [2, 5, 10, 20] {
         let (twin, drive) = (Chain(n), levels(200));

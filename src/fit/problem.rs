@@ -393,7 +393,7 @@ impl Problem {
             .collect()
     }
 
-    /// What `then` makes of the innovations of each record at each of several θ, one after the other; `None` where the twin does not work.
+    /// Calls `then` with the innovations of each record at each of several θ, one after the other; `None` where the twin does not work.
     pub fn each_filtered<T>(
         &self,
         thetas: &[Vec<f64>],

@@ -46,12 +46,8 @@ pub(crate) fn run(
     let restarts = noise.child("restarts");
     let arrived = stages.of(false, || restarted(&problem, &mut fits, restarts))?;
     let levels = &measured.levels;
-    let asked = match settings.draws {
-        0 => DrawsAsked::Usual,
-        count => DrawsAsked::Count(count),
-    };
-    let is_asked = asked != DrawsAsked::Usual;
-    let draws = match problem.is_simulated() && !is_asked {
+    let asked = DrawsAsked::of(settings.draws);
+    let draws = match problem.is_simulated() && settings.draws == 0 {
         true => PosteriorSample::default(),
         false => stages.of(PosteriorSample::default(), || {
             drawn(&problem, &mut fits, asked, noise)
@@ -81,7 +77,7 @@ pub(crate) fn run(
         errors,
         residuals,
     } = stages.whole(|| FollowedRecords::new(&problem, &fitted.theta))?;
-    let posterior = match is_asked && draws.round.is_some() {
+    let posterior = match settings.draws > 0 && draws.round.is_some() {
         true => stages.of(None, || {
             table(&problem, &draws, noise.child("starts")).map(Some)
         })?,

@@ -36,6 +36,16 @@ pub(crate) enum DrawsAsked {
     Count(usize),
 }
 
+impl DrawsAsked {
+    /// So many, or with 0 as many as fits need.
+    pub fn of(count: usize) -> Self {
+        match count {
+            0 => Self::Usual,
+            count => Self::Count(count),
+        }
+    }
+}
+
 /// Number of draws whose time is that of a fit.
 fn usual(problem: &Problem) -> usize {
     (BUDGET.round_samples / problem.samples()).clamp(BUDGET.least_draws, BUDGET.most_draws)

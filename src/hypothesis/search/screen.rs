@@ -75,7 +75,7 @@ pub(crate) fn scan_from(
     Ok(all)
 }
 
-/// What `then` makes of what filters see of the last term of `extended` beside a model, from each start at which the twin works.
+/// Calls `then` with what filters see of the last term of `extended` beside a model, from each start at which the twin works.
 pub(crate) fn looked<T>(
     model: &Model,
     extended: &Extended,

@@ -41,7 +41,7 @@ impl Filtered {
         }
     }
 
-    /// What a filter saw of one output, from the innovation and its variance row by row.
+    /// Creates that of one output from the innovation and its variance row by row.
     pub(super) fn of_one_output(
         log_likelihood: f64,
         rows: impl Iterator<Item = (f64, f64)>,

@@ -156,7 +156,7 @@ impl Kalman<'_> {
         })
     }
 
-    /// What is found at several θ, on all cores: `together` has that of each filter that has a lane, where they can run side by side.
+    /// Finds something at several θ, on all cores: `together` has it of each filter that has a lane, where they can run side by side.
     fn beside_or_alone<T: Send>(
         &self,
         thetas: &[Vec<f64>],
