@@ -57,7 +57,11 @@ impl Effect {
                 None if own == Some(key) => (
                     "id",
                     format!(
-                        "acts between two states; add {key} = \"…\", the name of the other one"
+                        "acts between two states; add {key} = \"…\", the name of the other one{}",
+                        match key {
+                            "to" => ", or of the only one",
+                            _ => "",
+                        }
                     ),
                 ),
                 _ => continue,

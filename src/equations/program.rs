@@ -2,7 +2,7 @@
 
 use super::tape::{LanesFeed, OperationTape, PointsFeed, TapeFeed};
 use crate::math::{Kernel, LANES, Lanes, widest};
-use crate::twin::{Blocks, Integrator, Interval, Now, Outline, StateSpace, Stepping};
+use crate::twin::{Blocks, Integrator, Interval, Layout, Now, Outline, StateSpace, Stepping};
 use smallvec::SmallVec;
 use std::cell::Cell;
 
@@ -221,6 +221,33 @@ impl Blocks for Program {
             tape: &self.tapes.drift,
             feed,
         });
+    }
+
+    fn drift_joined(&self, now: &[Now<'_>], at: Layout, each: usize, x: &[f64], dx: &mut [f64]) {
+        let dx = Cell::from_mut(dx).as_slice_of_cells();
+        let last = now.len() - 1;
+        let feed = LanesFeed {
+            now,
+            points: each / at.stride,
+            states: at.stride,
+            load: |index: usize| {
+                Lanes(std::array::from_fn(|lane| x[lane.min(last) * each + index]))
+            },
+            take: |point: usize, state: usize, values: Lanes| {
+                let rates = dx.iter().skip(point * at.stride + state).step_by(each);
+                for (rate, value) in rates.zip(values.0) {
+                    rate.set(value);
+                }
+            },
+        };
+        widest(Wide {
+            tape: &self.tapes.drift,
+            feed,
+        });
+    }
+
+    fn is_wide(&self) -> bool {
+        self.integrator != Integrator::Discrete
     }
 
     fn observe_lanes(&self, now: &[Now<'_>], x: &[Lanes], y: &mut [Lanes]) {

@@ -1,7 +1,7 @@
 //! Equations that take all points of a step in one call.
 
 use crate::math::Lanes;
-use crate::twin::{Now, SimulationError};
+use crate::twin::{Layout, Now, SimulationError};
 
 /// Equations that are faster for many points in one call than for one after the other: each choice of what to compute is paid once.
 ///
@@ -21,10 +21,16 @@ pub trait Blocks: Send + Sync {
 
     /// As [`drift`](Self::drift), of several filters with parameters of their own, `each` numbers of a filter: for equations of which a call
     /// costs more than what it computes.
-    fn drift_joined(&self, _now: &[Now<'_>], _each: usize, _x: &[f64], _dx: &mut [f64]) {}
+    fn drift_joined(&self, _: &[Now<'_>], _at: Layout, _each: usize, _x: &[f64], _dx: &mut [f64]) {}
 
     /// Returns whether [`drift_joined`](Self::drift_joined) is to be called.
     fn is_joined(&self) -> bool {
+        false
+    }
+
+    /// Returns whether it serves several filters at little more than the cost of one. The first filter then chooses the steps of all, as where
+    /// each is called for itself.
+    fn is_wide(&self) -> bool {
         false
     }
 

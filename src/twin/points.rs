@@ -220,10 +220,21 @@ pub(super) fn advance_together(
     carry: impl FnOnce(&mut [f64], &mut Workspace),
     constrain: impl FnOnce(&mut [f64]),
 ) -> bool {
-    let shifts = &points.shifts[..n];
     points.limit(n);
+    carry(&mut points.all[..points.moving * n], work);
+    constrain_together(n, points, work, constrain)
+}
+
+/// Constrains points that have moved, and the shifted ones; returns whether that acted on any that matters to the noise.
+#[inline(always)]
+pub(super) fn constrain_together(
+    n: usize,
+    points: Points<'_>,
+    work: &mut Workspace,
+    constrain: impl FnOnce(&mut [f64]),
+) -> bool {
+    let shifts = &points.shifts[..n];
     let (moving, shifted) = points.all.split_at_mut(points.moving * n);
-    carry(moving, work);
     let pairs = || (shifts.iter().enumerate()).flat_map(|(i, s)| [(i, *s), (i, -s)]);
     let before = work.stage(n);
     before.copy_from_slice(&moving[..n]);
@@ -270,13 +281,21 @@ pub(super) fn lanes_one_by_one(
             shifts: &*shift,
         };
         bent[lane] = advance(at, point);
-        let (moved, shifted) = one.split_at(moving * n);
-        scatter(moved, (lane, now.len()), &mut all[..moving * n]);
-        if bent[lane] {
-            scatter(shifted, (lane, now.len()), &mut all[moving * n..]);
-        }
+        scatter_moved(moving * n, one, (lane, now.len(), bent[lane]), all);
     }
     bent
+}
+
+/// Copies the first `moving` numbers of one lane in, the others only where a constraint acted.
+#[inline(always)]
+pub(super) fn scatter_moved(
+    moving: usize,
+    from: &[f64],
+    (lane, used, is_bent): (usize, usize, bool),
+    to: &mut [Lanes],
+) {
+    let count = if is_bent { from.len() } else { moving };
+    scatter(&from[..count], (lane, used), &mut to[..count]);
 }
 
 /// States of a twin in lanes, at most.

@@ -9,7 +9,8 @@ use crate::equations::Program;
 use crate::math::Lanes;
 use crate::setting::number;
 use crate::twin::{
-    Blocks, Composed, Integrator, Interval, Now, Outline, SimulationError, StateSpace, Stepping,
+    Blocks, Composed, Integrator, Interval, Layout, Now, Outline, SimulationError, StateSpace,
+    Stepping,
 };
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -281,7 +282,7 @@ impl Blocks for ServedEquations {
         self.motion == Some(ServedMethod::Drift)
     }
 
-    fn drift_joined(&self, now: &[Now<'_>], each: usize, x: &[f64], dx: &mut [f64]) {
+    fn drift_joined(&self, now: &[Now<'_>], _: Layout, each: usize, x: &[f64], dx: &mut [f64]) {
         let Some(method) = self.motion else {
             return;
         };

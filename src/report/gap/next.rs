@@ -129,9 +129,13 @@ fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
         state.map_or(String::new(), |state| format!("{key} = \"{state}\"\n"))
     };
     let other = other("from", entry.from) + &other("to", entry.to);
-    let finite = fit.magnitudes.iter().filter(|(_, value)| value.is_finite());
-    let values: Vec<String> = finite
-        .map(|(name, value)| format!("{name} = {:?}", six_digits(*value)))
+    // One that is off is infinite; what is left out would be estimated.
+    let told = fit.magnitudes.iter().filter(|(_, value)| !value.is_nan());
+    let values: Vec<String> = told
+        .map(|(name, value)| match value.is_finite() {
+            true => format!("{name} = {:?}", six_digits(*value)),
+            false => format!("{name} = {value:?}"),
+        })
         .collect();
     Some(format!(
         "[[effect]]\nid = \"{}\"\ntarget = \"{}\"\n{other}magnitudes = {{ {} }}\n",
@@ -139,4 +143,32 @@ fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
         fit.target,
         values.join(", ")
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::fixture::tanks;
+    use crate::study::StudyFile;
+    use std::path::Path;
+
+    /// A side that is off stays so: a magnitude that is left out would be estimated.
+    #[test]
+    fn a_table_has_the_magnitudes_that_are_off() {
+        let fit = EffectFit {
+            id: "sensor-clipping".into(),
+            target: "sensor".into(),
+            probability: 1.0,
+            magnitudes: vec![("low".into(), f64::NEG_INFINITY), ("high".into(), 0.9014)],
+            log_evidence: 9.0,
+            also: vec![],
+        };
+        let study = tanks(60);
+        let table = study_table(&Units::of(&study), &fit).unwrap();
+        assert!(table.contains("{ low = -inf, high = 0.9014 }"), "{table}");
+        let file = StudyFile::parse(&format!("twin = \"tanks\"\n{table}"), Path::new("s.toml"));
+        let added = study.configure(&file.unwrap()).unwrap();
+        let [own, all] = [&study, &added].map(|study| study.twin().parameters().len());
+        assert_eq!(all, own, "nothing is left to estimate");
+    }
 }

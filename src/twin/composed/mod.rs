@@ -238,17 +238,27 @@ impl Composed {
     /// nothing. `now` has all of θ.
     #[inline(always)]
     fn inside<R>(&self, now: &Now<'_>, x: Option<&[f64]>, then: impl FnOnce(&Now<'_>) -> R) -> R {
-        let parts = &*self.parts;
-        let own = &now.theta[..parts.parameters];
-        let t = parts.time(now, 0);
-        if !parts.acts.on_parameters {
-            return then(&Now {
-                t,
-                theta: own,
-                ..*now
-            });
+        then(&self.own_now(now, self.bent(now, x).as_ref()))
+    }
+
+    /// The twin's own time and θ, which is that of `now` where nothing bends it.
+    #[inline(always)]
+    fn own_now<'n>(&self, now: &Now<'n>, bent: Option<&'n Theta>) -> Now<'n> {
+        Now {
+            t: self.parts.time(now, 0),
+            theta: bent.map_or(&now.theta[..self.parts.parameters], |theta| theta),
+            ..*now
         }
-        let mut theta = Theta::from_slice(own);
+    }
+
+    /// Returns the twin's own θ where parts bend it.
+    #[inline(always)]
+    fn bent(&self, now: &Now<'_>, x: Option<&[f64]>) -> Option<Theta> {
+        let parts = &*self.parts;
+        if !parts.acts.on_parameters {
+            return None;
+        }
+        let mut theta = Theta::from_slice(&now.theta[..parts.parameters]);
         for added in parts.list.iter().rev() {
             match (&added.part, x) {
                 (TwinPart::Law(part), x) => {
@@ -268,11 +278,7 @@ impl Composed {
                 _ => {}
             }
         }
-        then(&Now {
-            t,
-            theta: &theta,
-            ..*now
-        })
+        Some(theta)
     }
 
     /// Checks once before a run that θ can be simulated at this step.

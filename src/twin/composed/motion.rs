@@ -1,12 +1,15 @@
 //! Motion of composed equations, of as many points as are given.
 
+use super::own::are_together;
 use super::parts::Theta;
 use super::{Composed, Entry, Law, TwinPart};
 use crate::math::{LANES, Lanes};
 use crate::twin::points::{
-    LanePlaces, Layout, Points, advance_together, lanes_one_by_one, observe_lanes, readout_lanes,
+    LanePlaces, Layout, Points, advance_together, constrain_together, gather, lanes_one_by_one,
+    observe_lanes, readout_lanes, scatter_moved,
 };
 use crate::twin::{EventCalls, Now, Workspace};
+use smallvec::SmallVec;
 
 impl Composed {
     /// Sets `dx` to the rates of the states `x`, of one point or of several side by side.
@@ -245,8 +248,89 @@ impl Composed {
         if self.parts.acts.leave_motion() {
             return self.own.advance_lanes(at.own(), points, one, work);
         }
+        if self.own.is_wide() && !self.parts.acts.by_states && are_together(at.whole()) {
+            return self.advance_joined(at.whole(), points, one, work);
+        }
         let advance = |now: &Now<'_>, points: Points<'_>| self.advance(now, points, work);
         lanes_one_by_one(points.shifts.len(), at.whole(), points, one, advance)
+    }
+
+    /// The same with one call of the equations for all filters, which take the steps of the first.
+    fn advance_joined(
+        &self,
+        now: &[Now<'_>],
+        points: Points<'_, Lanes>,
+        (one, shift): (&mut [f64], &mut [f64]),
+        work: &mut Workspace,
+    ) -> [bool; LANES] {
+        let Points {
+            all,
+            moving,
+            limits,
+            shifts,
+        } = points;
+        let n = shifts.len();
+        let (each, shift) = (moving * n, &mut shift[..n]);
+        let one = &mut one[..each + 2 * n * n];
+        let mut joined = vec![0.0; each * now.len()];
+        for (lane, (now, x)) in now.iter().zip(joined.chunks_exact_mut(each)).enumerate() {
+            gather(&all[..each], lane, x);
+            let shifts = &*shift;
+            let mut point = Points {
+                all: &mut *x,
+                moving,
+                limits,
+                shifts,
+            };
+            point.limit(n);
+            self.remember(now, None, x);
+        }
+        if work.is_adaptive() {
+            let mut first = joined[..each].to_vec();
+            self.carry(n, (&now[0], None), &mut first, work);
+        }
+        work.carry(n, &now[0], &mut joined, |stage, x, dx| {
+            self.rates_joined((now, stage), each, x, dx);
+        });
+        let mut bent = [false; LANES];
+        for (lane, (at, x)) in now.iter().zip(joined.chunks_exact(each)).enumerate() {
+            one[..each].copy_from_slice(x);
+            gather(shifts, lane, shift);
+            let point = Points {
+                all: &mut *one,
+                moving,
+                limits,
+                shifts: &*shift,
+            };
+            bent[lane] = constrain_together(n, point, work, |x| self.bound(at, None, x));
+            scatter_moved(each, one, (lane, now.len(), bent[lane]), all);
+        }
+        bent
+    }
+
+    /// Rates of the points of several filters at a stage of a step, `each` numbers of a filter; parameters follow no states.
+    fn rates_joined(
+        &self,
+        (now, stage): (&[Now<'_>], &Now<'_>),
+        each: usize,
+        x: &[f64],
+        dx: &mut [f64],
+    ) {
+        let with = |theta| Now { theta, ..*stage };
+        let bent: Vec<Theta> = (now.iter())
+            .filter_map(|now| self.bent(&with(now.theta), None))
+            .collect();
+        let own: SmallVec<[Now<'_>; LANES]> = (now.iter().enumerate())
+            .map(|(lane, now)| self.own_now(&with(now.theta), bent.get(lane)))
+            .collect();
+        dx.fill(0.0);
+        self.own.drift_joined(&own, self.layout(), each, x, dx);
+        if self.parts.acts.on_rates {
+            let points = x.chunks_exact(each).zip(dx.chunks_exact_mut(each));
+            for ((now, own), (x, dx)) in now.iter().zip(&own).zip(points) {
+                self.push(&with(now.theta), own, x, dx);
+            }
+        }
     }
 
     /// One output of the points, `n` states each, of several filters, one a lane; `buffer` holds those of one of them.

@@ -4,6 +4,7 @@ use super::engine::{Engine, as_rates};
 use crate::math::{LANES, Lanes};
 use crate::twin::points::{Layout, Points, gather, lanes_one_by_one, scatter};
 use crate::twin::{Blocks, Integrator, Interval, Now, SimulationError, StateSpace, Workspace};
+use smallvec::SmallVec;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -49,6 +50,25 @@ impl OwnEquations {
     /// Returns whether the points of several filters go in one call of the rates, whatever the parameters of each.
     pub fn joins_lanes(&self) -> bool {
         (self.blocks.as_ref()).is_some_and(|blocks| blocks.is_joined())
+    }
+
+    /// Returns whether rates of several filters cost little more than those of one.
+    pub fn is_wide(&self) -> bool {
+        (self.blocks.as_ref()).is_some_and(|blocks| blocks.is_wide())
+    }
+
+    /// Rates of the points of several filters, `each` numbers of a filter; only where the equations are [wide](Self::is_wide).
+    pub fn drift_joined(
+        &self,
+        now: &[Now<'_>],
+        at: Layout,
+        each: usize,
+        x: &[f64],
+        dx: &mut [f64],
+    ) {
+        if let Some(blocks) = &self.blocks {
+            blocks.drift_joined(now, at, each, x, dx);
+        }
     }
 
     /// Returns why the last run at this θ failed, if the equations know.
@@ -105,7 +125,11 @@ impl OwnEquations {
         };
         let n = points.shifts.len();
         if !work.is_plain() {
-            if blocks.is_joined() && !work.is_implicit() && are_together(now) {
+            let (is_wide, is_joined) = (blocks.is_wide(), blocks.is_joined());
+            if (is_wide || is_joined && !work.is_implicit()) && are_together(now) {
+                if is_wide && work.is_adaptive() {
+                    self.choose_steps(now, &points, one, work);
+                }
                 advance_joined(&**blocks, now, points, work);
                 return [false; LANES];
             }
@@ -117,6 +141,25 @@ impl OwnEquations {
         limit_lanes(points.limits, x);
         blocks.step_lanes(now, x);
         [false; LANES]
+    }
+
+    /// Carries the points of the first filter alone, for the steps that it takes.
+    fn choose_steps(
+        &self,
+        now: &[Now<'_>],
+        points: &Points<'_, Lanes>,
+        (one, shift): (&mut [f64], &mut [f64]),
+        work: &mut Workspace,
+    ) {
+        let n = points.shifts.len();
+        gather(&points.all[..points.moving * n], 0, one);
+        let first = Points {
+            all: one,
+            moving: points.moving,
+            limits: points.limits,
+            shifts: &shift[..n],
+        };
+        self.advance_points(&now[0], first, work);
     }
 
     pub fn observe_lanes(
@@ -136,7 +179,7 @@ impl OwnEquations {
 }
 
 /// Returns whether filters differ in their parameters alone.
-fn are_together(now: &[Now<'_>]) -> bool {
+pub(super) fn are_together(now: &[Now<'_>]) -> bool {
     let first = &now[0];
     let times = |now: &Now<'_>| [now.t, now.dt, now.end, now.since, now.first_time, now.begun];
     now.iter().all(|now| {
@@ -166,13 +209,13 @@ fn advance_joined(
         gather(moving, lane, all);
     }
     work.carry(n, &now[0], &mut all, |stage, x, dx| {
-        let each_now: Vec<Now<'_>> = (now.iter())
+        let each_now: SmallVec<[Now<'_>; LANES]> = (now.iter())
             .map(|now| Now {
                 theta: now.theta,
                 ..*stage
             })
             .collect();
-        blocks.drift_joined(&each_now, each, x, dx);
+        blocks.drift_joined(&each_now, Layout::dense(n), each, x, dx);
     });
     for (lane, all) in all.chunks_exact(each).enumerate() {
         scatter(all, (lane, now.len()), moving);

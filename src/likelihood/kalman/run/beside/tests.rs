@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::effect::{Catalogue, augment};
+use crate::equations::Equations;
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Score};
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Composed, Noise};
@@ -124,6 +125,57 @@ fn lanes_of_twins_with_effects_are_the_scalar_pass() {
         let centre = [&CENTRE[..], magnitudes].concat();
         let measured = record(twin, &centre, &tanks_drive(), 1);
         agree(twin, &centre, &measured, &settings);
+    }
+}
+
+/// Texts in adaptive steps, which are those of the first lane: where all lanes have its θ, they are the scalar pass. With a start of a sensor's
+/// memory, a force, a parameter that time moves, and limits that act.
+#[test]
+fn lanes_of_texts_are_the_scalar_pass() {
+    let library = Catalogue::default();
+    let text = include_str!("../../../../../examples/pendulum.toml");
+    let text = Arc::new(Equations::parse(text).unwrap());
+    let own = [1.0, 0.3];
+    let levels = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 15) * 7 % 5) as f64 * 0.4 - 0.8);
+    let drive = Drive::new(0.05, levels).unwrap();
+    let settings = FilterSettings::default();
+    let all: [(&str, &str, &[f64]); 6] = [
+        ("", "", &[]),
+        ("sensor-lag", "sensor", &[0.1]),
+        ("quadratic-drag", "v", &[0.2]),
+        ("parameter-drift", "c", &[0.2]),
+        ("state-ceiling", "q", &[0.25, 0.0]),
+        ("sensor-saturation", "sensor", &[-0.2, 0.2]),
+    ];
+    for (id, target, magnitudes) in all {
+        let effect = (!id.is_empty()).then(|| library.effect(id, target).unwrap());
+        let twin = augment(text.clone(), effect.into_iter().collect()).unwrap();
+        let theta = [&own[..], &magnitudes[..twin.parameters().len() - 2]].concat();
+        let twin = twin.equations().unwrap();
+        let measured = record(twin, &theta, &drive, 1);
+        let kalman = Kalman::new(twin, &measured, &settings).unwrap().of_cells();
+        let scalar = kalman.filter(&theta).unwrap();
+        for found in kalman.filter_all(&vec![theta; 8]).unwrap() {
+            let found = found.unwrap();
+            let error = &found.standardised - &scalar.standardised;
+            assert!(error.iter().all(|e| e.abs() < 1e-8), "{id}");
+            assert!(
+                (found.log_likelihood - scalar.log_likelihood).abs() < 1e-7,
+                "{id}"
+            );
+        }
+        // Elsewhere the steps of the first one keep the tolerance nearly as well as own ones.
+        let around = thetas(&kalman.parameters().centre());
+        let together = kalman.log_likelihoods(&around).unwrap();
+        for (together, theta) in together.iter().zip(&around) {
+            let alone = kalman.log_likelihood(theta);
+            if let (Some(together), Ok(alone)) = (together, alone) {
+                assert!(
+                    (together - alone).abs() < 1e-3 * alone.abs().max(1.0),
+                    "{id}"
+                );
+            }
+        }
     }
 }
 
