@@ -328,8 +328,12 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
                 "names no file; write its path"
             }
             DeValue::Table(inner) if keeps_intervals || matches!(name, "fixed" | "record") => {
-                let is_plan = name == "record" && key == "input";
-                check_table(if is_plan { "input" } else { name }, inner)?;
+                let own = match (name, &**key) {
+                    ("record", "input") => "input",
+                    ("record", "columns") => "columns",
+                    (name, _) => name,
+                };
+                check_table(own, inner)?;
                 continue;
             }
             DeValue::Datetime(_) if matches!(name, "record" | "input") => {

@@ -20,15 +20,15 @@ pub trait Blocks: Send + Sync {
     fn observe_lanes(&self, now: &[Now<'_>], x: &[Lanes], y: &mut [Lanes]);
 
     /// As [`drift`](Self::drift), of several filters with parameters of their own, `each` numbers of a filter: for equations of which a call
-    /// costs more than what it computes.
+    /// costs more than what it computes, [joined](Self::is_joined) or [wide](Self::is_wide).
     fn drift_joined(&self, _: &[Now<'_>], _at: Layout, _each: usize, _x: &[f64], _dx: &mut [f64]) {}
 
-    /// Returns whether [`drift_joined`](Self::drift_joined) is to be called.
+    /// Returns whether a call waits for an exchange, so that all filters go in one and choose their steps together.
     fn is_joined(&self) -> bool {
         false
     }
 
-    /// Returns whether it serves several filters at little more than the cost of one. The first filter then chooses the steps of all, as where
+    /// Returns whether a call serves several filters at little more than the cost of one. The first filter then chooses the steps of all, as where
     /// each is called for itself.
     fn is_wide(&self) -> bool {
         false

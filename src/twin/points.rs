@@ -358,11 +358,9 @@ pub(super) fn readout_lanes(
         let values = &mut few[..y.len()];
         for ((lane, at), changed) in now.iter().enumerate().zip(&mut changed) {
             gather(y, lane, values);
-            if readout(at, values) {
-                *changed = true;
-                y.iter_mut()
-                    .zip(&*values)
-                    .for_each(|(y, value)| y.0[lane] = *value);
+            *changed |= readout(at, values);
+            for (y, value) in y.iter_mut().zip(&*values) {
+                y.0[lane] = *value;
             }
         }
     }

@@ -90,15 +90,13 @@ pub(crate) fn looked<T>(
         .collect();
     // A little of what does nothing is told from nothing by its bits, which are others side by side.
     if looks.iter().any(|look| look.scales) {
-        let one = |look: &Look| {
-            let filtered = recoverable(problem.filtered(&look.theta))?;
-            Ok(filtered.map(|filtered| then(look, &filtered)))
-        };
-        return looks
-            .iter()
-            .map(one)
-            .filter_map(Result::transpose)
-            .collect();
+        let mut all = vec![];
+        for looks in looks.chunks(rayon::current_num_threads()) {
+            let found = try_each(looks, |look| recoverable(problem.filtered(&look.theta)))?;
+            let found = looks.iter().zip(found);
+            all.extend(found.filter_map(|(look, filtered)| Some(then(look, &filtered?))));
+        }
+        return Ok(all);
     }
     let thetas: Vec<Vec<f64>> = looks.iter().map(|look| look.theta.clone()).collect();
     let found = problem.each_filtered(&thetas, |i, filtered| then(&looks[i], &filtered))?;

@@ -1,4 +1,4 @@
-//! Calls of the twin by a filter, whose numbers are one or those of several filters side by side. The twin's equations are plain f64.
+//! Calls of the twin by a filter, whose numbers are one or those of several filters side by side. Equations in Rust are plain f64.
 
 use crate::math::{Lanes, Mask, Number};
 use crate::twin::{Composed, LanePlaces, LevelFactors, Points, Workspace};

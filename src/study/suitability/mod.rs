@@ -98,8 +98,11 @@ impl Study {
                 0 => space.centre(),
                 _ => space.draw_prior(noise),
             };
-            match self.twin.simulate(&theta, record.drive(), noise) {
-                Err(error) if !error.costs_one_run() => {
+            let run = self.twin.simulate(&theta, record.drive(), noise);
+            stage.tick()?;
+            match run {
+                // At a draw, the fault may be that of an unusual θ.
+                Err(error) if draw == 0 && !error.costs_one_run() => {
                     findings.push(Finding::failure("scale", error.to_string()));
                     return Ok(Suitability {
                         findings,
@@ -108,7 +111,6 @@ impl Study {
                 }
                 run => runs.extend(run.ok().filter(|run| run.iter().all(|v| v.is_finite()))),
             }
-            stage.tick()?;
         }
         findings.extend(channels::check(self, &record, planned_drive, &runs));
         let (found, order) = swapped::check(self, &record, &runs);

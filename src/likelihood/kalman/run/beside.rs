@@ -1,7 +1,8 @@
 //! Filters side by side: up to eight pairs of parameters and record at once.
 //!
-//! Each number of the recursion is eight numbers ([`Lanes`]), one for each θ, which the processor handles together. The twin's equations stay
-//! plain f64 and are called for one lane after the other.
+//! Each number of the recursion is eight numbers ([`Lanes`]), one for each θ, which the processor handles together. Equations in Rust stay
+//! plain f64 and are called for one lane after the other; those of a text take all lanes in one call. Steps to a tolerance are those that the
+//! first lane chooses.
 
 use crate::likelihood::kalman::order::Order;
 use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
@@ -136,13 +137,17 @@ impl Kalman<'_> {
         })
     }
 
-    /// As [`log_likelihoods`](Self::log_likelihoods), with all that the filters saw but the states.
+    /// As [`log_likelihoods`](Self::log_likelihoods), with all that the filters saw but the states. Steps to a tolerance are each one's own.
     pub(crate) fn filter_all(
         &self,
         thetas: &[Vec<f64>],
     ) -> Result<Vec<Option<Filtered>>, FilterError> {
         let alone = |theta: &[f64]| self.filter(theta);
+        let is_adaptive = self.twin.workspace().steps_taken().is_some();
         self.beside_or_alone(thetas, alone, |held| {
+            if is_adaptive {
+                return None;
+            }
             let (mut pass, mut rows) = (held.pass(), LaneRows::default());
             pass.run_to(self.record.samples(), &mut rows).ok()?;
             let values = pass.log_likelihood();

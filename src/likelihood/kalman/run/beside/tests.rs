@@ -5,7 +5,7 @@ use crate::effect::{Catalogue, augment};
 use crate::equations::Equations;
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Score};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{Composed, Noise};
+use crate::twin::{Composed, Hold, Integrator, Noise};
 use crate::twins::{CascadedTanks, VanDerPol};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -128,16 +128,48 @@ fn lanes_of_twins_with_effects_are_the_scalar_pass() {
     }
 }
 
+fn pendulum() -> (Arc<Equations>, Drive) {
+    let text = include_str!("../../../../../examples/pendulum.toml");
+    let levels = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 15) * 7 % 5) as f64 * 0.4 - 0.8);
+    let drive = Drive::new(0.05, levels).unwrap();
+    (Arc::new(Equations::parse(text).unwrap()), drive)
+}
+
+/// In fixed steps all lanes are those of the scalar pass, whatever their θ: substeps, inputs on lines, and parts that act on the motion.
+#[test]
+fn lanes_of_texts_in_fixed_steps_are_the_scalar_pass() {
+    let (text, drive) = pendulum();
+    let library = Catalogue::default();
+    let settings = FilterSettings::default();
+    let all: [(&str, &str, &[f64]); 4] = [
+        ("", "", &[]),
+        ("sensor-lag", "sensor", &[0.1]),
+        ("quadratic-drag", "v", &[0.2]),
+        ("parameter-drift", "c", &[0.2]),
+    ];
+    for (id, target, magnitudes) in all {
+        let effect = (!id.is_empty()).then(|| library.effect(id, target).unwrap());
+        let twin = augment(text.clone(), effect.into_iter().collect()).unwrap();
+        for rule in [Integrator::Euler, Integrator::RungeKutta4] {
+            let twin = twin.stepped(|own, stepping| {
+                (*own, stepping.substeps, stepping.hold) = (rule, 2, Hold::Linear);
+            });
+            let twin = twin.unwrap();
+            let twin = twin.equations().unwrap();
+            let centre = [&[1.0, 0.3], magnitudes].concat();
+            let measured = record(twin, &centre, &drive, 1);
+            agree(twin, &centre, &measured, &settings);
+        }
+    }
+}
+
 /// Texts in adaptive steps, which are those of the first lane: where all lanes have its θ, they are the scalar pass. With a start of a sensor's
 /// memory, a force, a parameter that time moves, and limits that act.
 #[test]
 fn lanes_of_texts_are_the_scalar_pass() {
     let library = Catalogue::default();
-    let text = include_str!("../../../../../examples/pendulum.toml");
-    let text = Arc::new(Equations::parse(text).unwrap());
+    let (text, drive) = pendulum();
     let own = [1.0, 0.3];
-    let levels = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 15) * 7 % 5) as f64 * 0.4 - 0.8);
-    let drive = Drive::new(0.05, levels).unwrap();
     let settings = FilterSettings::default();
     let all: [(&str, &str, &[f64]); 6] = [
         ("", "", &[]),
