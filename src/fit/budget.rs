@@ -80,8 +80,8 @@ numbers! {
         draws_each: usize = 4,
         /// Rounds of adaptation where draws are asked for, or are to be steady; else one.
         adaptations: usize = 3,
-        /// Effective draws of a first round, as a share of it, from which no other follows unless a number of draws is asked for: of a normal posterior of four
-        /// entries they are 0.86, of twelve 0.69. Twice is more than any has; with half, a tenth of the draws makes most of an interval.
+        /// Effective draws of a first round, as a share of it, from which no other follows unless a number of draws is asked for: of a
+        /// normal posterior of four entries they are 0.86, of twelve 0.69. Twice is more than any has; with half, a tenth of the draws makes most of an interval.
         even_weights: f64 = 0.7,
         /// Share of the first proposals' covariance in those that follow their draws.
         kept_covariance: f64 = 0.05,

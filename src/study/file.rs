@@ -130,11 +130,7 @@ impl StudyFile {
             .map(|input| grid_of_files(input).map_err(of_input))
             .transpose()?;
         if let Some((input, step, samples)) = grid.flatten() {
-            let RecordTable {
-                step: other_step,
-                samples: other_samples,
-                ..
-            } = file.record;
+            let (own_step, own_samples) = (file.record.step, file.record.samples);
             let contradicts = |key, own: String| {
                 let problem = format!(
                     "{key} = {own} contradicts {}, which has {}, step {} s; leave it out",
@@ -144,10 +140,10 @@ impl StudyFile {
                 );
                 file.located(StudyError::Plan(problem))
             };
-            if let Some(own) = other_step.filter(|own| (own - step).abs() > UNIFORM * step) {
+            if let Some(own) = own_step.filter(|own| (own - step).abs() > UNIFORM * step) {
                 return Err(contradicts("step", number(own)));
             }
-            if let Some(own) = other_samples.filter(|own| *own != samples) {
+            if let Some(own) = own_samples.filter(|own| *own != samples) {
                 return Err(contradicts("samples", number(own as f64)));
             }
             (file.record.step, file.record.samples) = (Some(step), Some(samples));

@@ -192,6 +192,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             });
         }
         let now: Vec<Now<'_>> = (jobs.iter()).map(|job| job.acting.at(0)).collect();
+        let theta = |lane| now[held_by(lane, jobs.len())].theta;
+        let factors = kalman.twin.level_factors(theta);
         let now = match N::LANES {
             1 => LanePlaces::of_one(now[0]),
             _ => LanePlaces::new(now, kalman.twin.own_parameters()),
@@ -201,8 +203,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             jobs,
             kalman,
             order,
-            factors: (kalman.twin)
-                .level_factors(|lane| jobs[held_by(lane, jobs.len())].acting.at(0).theta),
+            factors,
             now,
             copy: FilterState::zero(n),
             row: 0,

@@ -132,10 +132,7 @@ fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
     // One that is off is infinite; what is left out would be estimated.
     let told = fit.magnitudes.iter().filter(|(_, value)| !value.is_nan());
     let values: Vec<String> = told
-        .map(|(name, value)| match value.is_finite() {
-            true => format!("{name} = {:?}", six_digits(*value)),
-            false => format!("{name} = {value:?}"),
-        })
+        .map(|(name, value)| format!("{name} = {:?}", six_digits(*value)))
         .collect();
     Some(format!(
         "[[effect]]\nid = \"{}\"\ntarget = \"{}\"\n{other}magnitudes = {{ {} }}\n",

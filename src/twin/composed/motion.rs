@@ -1,6 +1,6 @@
 //! Motion of composed equations, of as many points as are given.
 
-use super::own::are_together;
+use super::own::{are_together, joined};
 use super::parts::Theta;
 use super::{Composed, Entry, Law, TwinPart};
 use crate::math::{LANES, Lanes};
@@ -272,17 +272,8 @@ impl Composed {
         let n = shifts.len();
         let (each, shift) = (moving * n, &mut shift[..n]);
         let one = &mut one[..each + 2 * n * n];
-        let mut joined = vec![0.0; each * now.len()];
-        for (lane, (now, x)) in now.iter().zip(joined.chunks_exact_mut(each)).enumerate() {
-            gather(&all[..each], lane, x);
-            let shifts = &*shift;
-            let mut point = Points {
-                all: &mut *x,
-                moving,
-                limits,
-                shifts,
-            };
-            point.limit(n);
+        let mut joined = joined(limits, now.len(), &mut all[..each]);
+        for (now, x) in now.iter().zip(joined.chunks_exact_mut(each)) {
             self.remember(now, None, x);
         }
         if work.is_adaptive() {

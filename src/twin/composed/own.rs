@@ -127,10 +127,7 @@ impl OwnEquations {
         if !work.is_plain() {
             let (is_wide, is_joined) = (blocks.is_wide(), blocks.is_joined());
             if (is_wide || is_joined && !work.is_implicit()) && are_together(now) {
-                if is_wide && work.is_adaptive() {
-                    self.choose_steps(now, &points, one, work);
-                }
-                advance_joined(&**blocks, now, points, work);
+                self.advance_joined(&**blocks, now, points, work);
                 return [false; LANES];
             }
             let advance =
@@ -143,23 +140,37 @@ impl OwnEquations {
         [false; LANES]
     }
 
-    /// Carries the points of the first filter alone, for the steps that it takes.
-    fn choose_steps(
+    /// Carries the points of several filters as those of one, which all take the same substeps: those of the first where a call is [wide].
+    ///
+    /// [wide]: Blocks::is_wide
+    fn advance_joined(
         &self,
+        blocks: &dyn Blocks,
         now: &[Now<'_>],
-        points: &Points<'_, Lanes>,
-        (one, shift): (&mut [f64], &mut [f64]),
+        points: Points<'_, Lanes>,
         work: &mut Workspace,
     ) {
         let n = points.shifts.len();
-        gather(&points.all[..points.moving * n], 0, one);
-        let first = Points {
-            all: one,
-            moving: points.moving,
-            limits: points.limits,
-            shifts: &shift[..n],
-        };
-        self.advance_points(&now[0], first, work);
+        let moving = &mut points.all[..points.moving * n];
+        let (each, mut all) = (moving.len(), joined(points.limits, now.len(), moving));
+        if blocks.is_wide() && work.is_adaptive() {
+            let mut first = all[..each].to_vec();
+            work.carry(n, &now[0], &mut first, |now, x, dx| {
+                self.drift_points(now, Layout::dense(n), x, dx);
+            });
+        }
+        work.carry(n, &now[0], &mut all, |stage, x, dx| {
+            let each_now: SmallVec<[Now<'_>; LANES]> = (now.iter())
+                .map(|now| Now {
+                    theta: now.theta,
+                    ..*stage
+                })
+                .collect();
+            blocks.drift_joined(&each_now, Layout::dense(n), each, x, dx);
+        });
+        for (lane, all) in all.chunks_exact(each).enumerate() {
+            scatter(all, (lane, now.len()), moving);
+        }
     }
 
     pub fn observe_lanes(
@@ -193,33 +204,14 @@ pub(super) fn are_together(now: &[Now<'_>]) -> bool {
     })
 }
 
-/// Carries the points of several filters as those of one, which all take the same substeps.
-fn advance_joined(
-    blocks: &dyn Blocks,
-    now: &[Now<'_>],
-    points: Points<'_, Lanes>,
-    work: &mut Workspace,
-) {
-    let n = points.shifts.len();
-    let moving = &mut points.all[..points.moving * n];
-    limit_lanes(points.limits, moving);
-    let each = moving.len();
-    let mut all = vec![0.0; each * now.len()];
-    for (lane, all) in all.chunks_exact_mut(each).enumerate() {
+/// Points of so many filters in their limits, filter after filter.
+pub(super) fn joined(limits: &[Interval], filters: usize, moving: &mut [Lanes]) -> Vec<f64> {
+    limit_lanes(limits, moving);
+    let mut all = vec![0.0; moving.len() * filters];
+    for (lane, all) in all.chunks_exact_mut(moving.len()).enumerate() {
         gather(moving, lane, all);
     }
-    work.carry(n, &now[0], &mut all, |stage, x, dx| {
-        let each_now: SmallVec<[Now<'_>; LANES]> = (now.iter())
-            .map(|now| Now {
-                theta: now.theta,
-                ..*stage
-            })
-            .collect();
-        blocks.drift_joined(&each_now, Layout::dense(n), each, x, dx);
-    });
-    for (lane, all) in all.chunks_exact(each).enumerate() {
-        scatter(all, (lane, now.len()), moving);
-    }
+    all
 }
 
 /// Puts points of several filters into their limits.

@@ -143,11 +143,10 @@ impl Kalman<'_> {
         thetas: &[Vec<f64>],
     ) -> Result<Vec<Option<Filtered>>, FilterError> {
         let alone = |theta: &[f64]| self.filter(theta);
-        let is_adaptive = self.twin.workspace().steps_taken().is_some();
+        if self.twin.workspace().steps_taken().is_some() {
+            return try_each(thetas, |theta| recoverable(alone(theta)));
+        }
         self.beside_or_alone(thetas, alone, |held| {
-            if is_adaptive {
-                return None;
-            }
             let (mut pass, mut rows) = (held.pass(), LaneRows::default());
             pass.run_to(self.record.samples(), &mut rows).ok()?;
             let values = pass.log_likelihood();

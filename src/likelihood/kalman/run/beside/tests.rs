@@ -5,7 +5,7 @@ use crate::effect::{Catalogue, augment};
 use crate::equations::Equations;
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Score};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{Composed, Hold, Integrator, Noise};
+use crate::twin::{Composed, Hold, Integrator, Noise, Twin};
 use crate::twins::{CascadedTanks, VanDerPol};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -42,8 +42,12 @@ fn thetas(centre: &[f64]) -> Vec<Vec<f64>> {
 
 fn agree(twin: impl Into<Composed>, centre: &[f64], record: &Record, settings: &FilterSettings) {
     let kalman = Kalman::new(twin, record, settings).unwrap().of_cells();
-    let thetas = thetas(centre);
-    let all: Vec<_> = thetas.iter().map(|theta| (&kalman, &theta[..])).collect();
+    agree_at(&kalman, &thetas(centre));
+}
+
+fn agree_at(kalman: &Kalman<'_>, thetas: &[Vec<f64>]) {
+    let record = kalman.record;
+    let all: Vec<_> = thetas.iter().map(|theta| (kalman, &theta[..])).collect();
     let held = SideBySide::of(&all).unwrap();
     let (mut pass, mut rows) = (held.pass(), LaneRows::default());
     // In blocks, as a score takes them.
@@ -68,7 +72,7 @@ fn agree(twin: impl Into<Composed>, centre: &[f64], record: &Record, settings: &
         let mut pairs = found.iter().zip(expected);
         pairs.all(|(a, b)| (a - b).abs() < 1e-7 * b.abs().max(1.0))
     };
-    for (found, theta) in kalman.filter_all(&thetas).unwrap().iter().zip(&thetas) {
+    for (found, theta) in kalman.filter_all(thetas).unwrap().iter().zip(thetas) {
         let (found, scalar) = (found.as_ref().unwrap(), kalman.filter(theta).unwrap());
         assert!(near(&found.log_densities, &scalar.log_densities));
         let standardised = [found, &scalar].map(|of| of.standardised.as_slice().unwrap());
@@ -135,11 +139,16 @@ fn pendulum() -> (Arc<Equations>, Drive) {
     (Arc::new(Equations::parse(text).unwrap()), drive)
 }
 
+/// The text with an effect, where one is named.
+fn with_effect(text: &Arc<Equations>, id: &str, target: &str) -> Twin {
+    let effect = (!id.is_empty()).then(|| Catalogue::default().effect(id, target).unwrap());
+    augment(text.clone(), effect.into_iter().collect()).unwrap()
+}
+
 /// In fixed steps all lanes are those of the scalar pass, whatever their θ: substeps, inputs on lines, and parts that act on the motion.
 #[test]
 fn lanes_of_texts_in_fixed_steps_are_the_scalar_pass() {
     let (text, drive) = pendulum();
-    let library = Catalogue::default();
     let settings = FilterSettings::default();
     let all: [(&str, &str, &[f64]); 4] = [
         ("", "", &[]),
@@ -148,8 +157,7 @@ fn lanes_of_texts_in_fixed_steps_are_the_scalar_pass() {
         ("parameter-drift", "c", &[0.2]),
     ];
     for (id, target, magnitudes) in all {
-        let effect = (!id.is_empty()).then(|| library.effect(id, target).unwrap());
-        let twin = augment(text.clone(), effect.into_iter().collect()).unwrap();
+        let twin = with_effect(&text, id, target);
         for rule in [Integrator::Euler, Integrator::RungeKutta4] {
             let twin = twin.stepped(|own, stepping| {
                 (*own, stepping.substeps, stepping.hold) = (rule, 2, Hold::Linear);
@@ -167,7 +175,6 @@ fn lanes_of_texts_in_fixed_steps_are_the_scalar_pass() {
 /// memory, a force, a parameter that time moves, and limits that act.
 #[test]
 fn lanes_of_texts_are_the_scalar_pass() {
-    let library = Catalogue::default();
     let (text, drive) = pendulum();
     let own = [1.0, 0.3];
     let settings = FilterSettings::default();
@@ -180,22 +187,12 @@ fn lanes_of_texts_are_the_scalar_pass() {
         ("sensor-saturation", "sensor", &[-0.2, 0.2]),
     ];
     for (id, target, magnitudes) in all {
-        let effect = (!id.is_empty()).then(|| library.effect(id, target).unwrap());
-        let twin = augment(text.clone(), effect.into_iter().collect()).unwrap();
+        let twin = with_effect(&text, id, target);
         let theta = [&own[..], &magnitudes[..twin.parameters().len() - 2]].concat();
         let twin = twin.equations().unwrap();
         let measured = record(twin, &theta, &drive, 1);
         let kalman = Kalman::new(twin, &measured, &settings).unwrap().of_cells();
-        let scalar = kalman.filter(&theta).unwrap();
-        for found in kalman.filter_all(&vec![theta; 8]).unwrap() {
-            let found = found.unwrap();
-            let error = &found.standardised - &scalar.standardised;
-            assert!(error.iter().all(|e| e.abs() < 1e-8), "{id}");
-            assert!(
-                (found.log_likelihood - scalar.log_likelihood).abs() < 1e-7,
-                "{id}"
-            );
-        }
+        agree_at(&kalman, &vec![theta; 8]);
         // Elsewhere the steps of the first one keep the tolerance nearly as well as own ones.
         let around = thetas(&kalman.parameters().centre());
         let together = kalman.log_likelihoods(&around).unwrap();
