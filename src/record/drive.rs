@@ -4,7 +4,7 @@ use super::channels::LARGEST;
 use crate::math::three_digits;
 use crate::record::{Quantity, RecordError};
 use crate::setting::count;
-use ndarray::{Array2, s};
+use ndarray::{Array1, Array2, ArrayView1, s};
 use std::sync::Arc;
 
 mod clock;
@@ -38,6 +38,17 @@ pub struct Drive {
     times: Option<Arc<[f64]>>,
     /// The file that the rows were read from, for messages.
     rows: FileRows,
+}
+
+/// Value at a time, on the line between rows at these times: the first one before them, the last one behind.
+pub(crate) fn on_line(times: &[f64], t: f64, value: impl Fn(usize) -> f64) -> f64 {
+    let after = times.partition_point(|time| *time <= t);
+    let before = after.saturating_sub(1);
+    if after == 0 || after == times.len() {
+        return value(before);
+    }
+    let share = (t - times[before]) / (times[after] - times[before]);
+    (1.0 - share) * value(before) + share * value(after)
 }
 
 impl Drive {
@@ -200,25 +211,19 @@ impl Drive {
 
     /// The same inputs later by so many seconds, linear between samples; the first ones before the start.
     pub(crate) fn late(&self, delay: f64) -> Result<Self, RecordError> {
+        let mut inputs = self.inputs.as_ref().clone();
+        for mut input in inputs.columns_mut() {
+            let late = self.delayed(input.view(), delay);
+            input.assign(&late);
+        }
+        self.with_inputs(inputs)
+    }
+
+    /// A signal at these times, later by so many seconds, linear between samples; its first value before the start.
+    pub(crate) fn delayed(&self, signal: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
         let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
-        let value = |(k, j): (usize, usize)| {
-            let t = times[k] - delay;
-            let after = times.partition_point(|time| *time <= t).min(k.max(1));
-            let Some(i) = after.checked_sub(1) else {
-                return self.inputs[[0, j]];
-            };
-            if after >= times.len() {
-                return self.inputs[[i, j]];
-            }
-            let step = times[after] - times[i];
-            let share = if step > 0.0 {
-                ((t - times[i]) / step).clamp(0.0, 1.0)
-            } else {
-                1.0
-            };
-            (1.0 - share) * self.inputs[[i, j]] + share * self.inputs[[after, j]]
-        };
-        self.with_inputs(Signal::from_shape_fn(self.inputs.dim(), value))
+        let late = |k: usize| on_line(&times[..=k], times[k] - delay, |i| signal[i]);
+        (0..self.samples()).map(late).collect()
     }
 
     /// A drive without inputs, N = `samples`.

@@ -24,7 +24,7 @@ pub use channels::{Quantity, Signals};
 pub(crate) use columns::Columns;
 pub(crate) use csv::{RecordReader, drive_csv_text, parse_record, record_csv_text, twin_csv_text};
 pub use drive::{Drive, Signal};
-pub(crate) use drive::{UNIFORM, check_size, check_sizes};
+pub(crate) use drive::{UNIFORM, check_size, check_sizes, on_line};
 pub use error::RecordError;
 pub use measured::Record;
 pub(crate) use resample::{InputRule, Resampled, resample};

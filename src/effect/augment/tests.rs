@@ -48,6 +48,54 @@ fn a_late_twin_is_a_twin_with_a_late_sensor() {
     }
 }
 
+/// Where steps vary, a delay reads the signal so many seconds ago, on the line between rows; of replicates, the same.
+#[test]
+fn a_delay_counts_seconds_where_steps_vary() {
+    let times = [0.0, 0.5, 2.0, 2.0, 2.0, 2.3, 5.0, 5.1, 9.0];
+    let u = |k: usize| if times[k] < 2.0 { 1.0 } else { times[k] };
+    let drive = Drive::with_times(&times, Signal::from_shape_fn((9, 1), |(k, _)| u(k))).unwrap();
+    let base = Twin::new(CascadedTanks);
+    let theta = [0.6, 0.5, 0.55, 1.0];
+    let delayed = |signal: &[f64], delay: f64| -> Vec<f64> {
+        let value = |t: f64| {
+            let after = times.iter().position(|time| *time > t).unwrap_or(9);
+            let Some(before) = after.checked_sub(1) else {
+                return signal[0];
+            };
+            let Some(next) = times.get(after) else {
+                return signal[before];
+            };
+            let share = (t - times[before]) / (next - times[before]);
+            signal[before] + share * (signal[after] - signal[before])
+        };
+        times.iter().map(|t| value(t - delay)).collect()
+    };
+    let run = |id: &str, target: &str, delay: f64| {
+        let effect = Catalogue::default().effect(id, target).unwrap();
+        let twin = augment(base.clone(), vec![effect]).unwrap();
+        let run = twin.free_run(&[&theta[..], &[delay]].concat(), &drive);
+        run.unwrap().column(0).to_vec()
+    };
+    let near = |run: Vec<f64>, expected: &[f64], what: &str| {
+        let mut errors = run.iter().zip(expected).map(|(a, b)| (a - b).abs());
+        assert!(errors.all(|e| e < 1e-12), "{what}: {run:?}, {expected:?}");
+    };
+    let plain = base.free_run(&theta, &drive).unwrap().column(0).to_vec();
+    for delay in [0.0, 0.1, 0.3, 1.7, 4.0, 20.0] {
+        let seen = run("sensor-delay", "sensor", delay);
+        near(seen, &delayed(&plain, delay), &format!("sensor {delay}"));
+        let acting = delayed(&(0..9).map(u).collect::<Vec<_>>(), delay);
+        let late = Signal::from_shape_fn((9, 1), |(k, _)| acting[k]);
+        let late = Drive::with_times(&times, late).unwrap();
+        let expected = base.free_run(&theta, &late).unwrap().column(0).to_vec();
+        near(
+            run("actuator-delay", "actuator", delay),
+            &expected,
+            &format!("actuator {delay}"),
+        );
+    }
+}
+
 /// Memories of a sensor move over the time since the row before, however the steps vary; replicates read one state.
 #[test]
 fn a_slow_sensor_counts_the_time_since_the_row_before() {

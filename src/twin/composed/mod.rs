@@ -306,11 +306,13 @@ impl Composed {
         check_lengths(outline, theta, drive)?;
         let theta = &self.parts.drawn(theta, noise);
         self.check_parameters(theta, drive.dt())?;
+        let mut without_delays = theta.clone();
+        let dead_time = DeadTime::of(self, &mut without_delays, drive);
         let mut setup = RunSetup {
             outline,
             limits: felt(self.limits()),
-            acting: Acting::of(self, theta, drive)?,
-            dead_time: DeadTime::of(self, theta, drive.dt()),
+            acting: Acting::of(self, &without_delays, drive)?,
+            dead_time,
             work: self.workspace(),
         };
         let outputs = if self.parts.acts.leave_runs() {

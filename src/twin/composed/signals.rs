@@ -271,6 +271,18 @@ impl Composed {
         all
     }
 
+    /// Sets delays of sensors to zero in all of θ, and returns those of each output in seconds; empty where none has one.
+    pub(super) fn take_delays(&self, theta: &mut [f64]) -> Vec<f64> {
+        let mut all = vec![];
+        for part in self.parts.laws().filter(|part| part.is_dead_time) {
+            if let Law::Sensor(_) = part.law {
+                all.resize(self.outputs(), 0.0);
+                all[part.target] += std::mem::take(&mut theta[part.magnitudes.start]);
+            }
+        }
+        all
+    }
+
     /// Returns the drive behind the actuators; `None` where inputs act as they are recorded. Inputs do not depend on states, so that
     /// filters need no states for what actuators remember.
     pub(crate) fn actuated(
@@ -315,6 +327,10 @@ impl LawPart {
         drive: &Drive,
         signal: &mut Signal,
     ) {
+        if self.is_dead_time && !drive.is_uniform() {
+            let late = drive.delayed(signal.column(self.target), self.m(theta)[0]);
+            return signal.column_mut(self.target).assign(&late);
+        }
         let mut memory = vec![signal[[0, self.target]]; self.memory];
         let on = LawPlace {
             target: 0,

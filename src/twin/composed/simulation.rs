@@ -2,7 +2,7 @@
 
 use super::Composed;
 use super::parts::Theta;
-use crate::record::{Drive, Signal};
+use crate::record::{Drive, Signal, on_line};
 use crate::setting::{count, number};
 use crate::twin::integrator::{Bends, Between, remove_amounts};
 use crate::twin::{Hold, Interval, Noise, Now, Outline, SimulationError, Workspace};
@@ -346,7 +346,7 @@ pub(super) fn simulate(
         let now = acting.at(k);
         let y = &mut outputs[k * p..(k + 1) * p];
         twin.observe(&now, &x, y);
-        dead_time.hold_back(y);
+        dead_time.hold_back(now.t, y);
         if !noise.is_off() {
             q.fill(0.0);
             r.fill(0.0);
@@ -380,35 +380,59 @@ fn ended(work: &Workspace, at: f64) -> SimulationError {
 
 /// Holds outputs back by their dead times; before the start, the first values stand.
 pub(crate) struct DeadTime {
-    /// Samples of each output; empty where none is late.
-    late: Vec<usize>,
-    /// Outputs so far, as observed.
+    /// Of each output; empty where none is late.
+    late: Vec<Late>,
+    /// Times and outputs so far, as observed.
+    times: Vec<f64>,
     observed: Vec<f64>,
+}
+
+/// A dead time of an output.
+#[derive(Debug, Clone, Copy)]
+enum Late {
+    /// Whole samples; its law has what is left.
+    Samples(usize),
+    /// All of it, on a line between samples: where steps vary.
+    Seconds(f64),
 }
 
 impl DeadTime {
     /// No output is late.
     pub(super) const NONE: Self = Self {
         late: vec![],
+        times: vec![],
         observed: vec![],
     };
 
-    pub fn of(twin: &Composed, theta: &[f64], dt: f64) -> Self {
-        Self {
-            late: twin.dead_time(theta, dt),
-            observed: vec![],
-        }
+    /// At all of θ, of which those are taken away that no law is to have besides.
+    pub fn of(twin: &Composed, theta: &mut [f64], drive: &Drive) -> Self {
+        let late = match drive.is_uniform() {
+            true => {
+                let samples = twin.dead_time(theta, drive.dt()).into_iter();
+                samples.map(Late::Samples).collect()
+            }
+            false => {
+                let seconds = twin.take_delays(theta).into_iter();
+                seconds.map(Late::Seconds).collect()
+            }
+        };
+        Self { late, ..Self::NONE }
     }
 
-    /// Replaces the outputs of the next sample by those that are shown at it.
-    pub fn hold_back(&mut self, y: &mut [f64]) {
+    /// Replaces the outputs of the next sample, at time `t`, by those that are shown at it.
+    pub fn hold_back(&mut self, t: f64, y: &mut [f64]) {
         if self.late.is_empty() {
             return;
         }
-        let (p, k) = (y.len(), self.observed.len() / y.len());
+        let (p, k) = (y.len(), self.times.len());
+        self.times.push(t);
         self.observed.extend_from_slice(y);
         for (j, (y, late)) in y.iter_mut().zip(&self.late).enumerate() {
-            *y = self.observed[k.saturating_sub(*late) * p + j];
+            let value = |i: usize| self.observed[i * p + j];
+            *y = match *late {
+                Late::Samples(late) => value(k.saturating_sub(late)),
+                Late::Seconds(late) => on_line(&self.times, t - late, value),
+            };
         }
     }
 }

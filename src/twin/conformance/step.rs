@@ -1,28 +1,37 @@
-//! Check of the step: half of it moves no output by more than its noise.
+//! Check of the step: half of each step taken moves no output by more than its noise.
 
 use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
 use crate::record::{Drive, Signal};
 use crate::setting::{number, unit_suffix};
-use crate::twin::{Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, TOLERANCES, Twin};
+use crate::twin::{
+    Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, StepsTaken, TOLERANCES, Twin,
+};
 
 /// Largest error of the step where no noise is declared, as a share of an output's deviation.
 const STEP_SHARE: f64 = 0.01;
 /// Share of the tolerance of adaptive steps that stands for exact ones.
 const FINER: f64 = 0.01;
+/// Rules that may do where a fixed step is too long.
+const RULES: [(Integrator, &str); 2] = [
+    (Integrator::RungeKutta4, "runge-kutta-4"),
+    (Integrator::Adaptive, "adaptive"),
+];
 /// Fault and remedy of a step that makes runs diverge.
 const DIVERGES: &str = "too long: the run diverges, with steps to a tolerance it does not; give the study the integrator adaptive";
 /// Runs that show what process noise does to an output without measurement noise: its scatter is known to a quarter.
 const NOISY_RUNS: u64 = 8;
 
-/// Differences of the noise-free outputs at θ between one step and half of it, rms by output; none for a black box.
+/// Differences of the noise-free outputs at θ between the steps taken and half of them, rms by output; none for a black box.
 pub(crate) fn step_error(
     twin: &Twin,
     theta: &[f64],
     drive: &Drive,
 ) -> Result<Vec<(String, f64)>, SimulationError> {
+    // A tolerance alone changes no step that has another reason.
+    let taken = twin.steps_taken(theta, drive).map_or(1, StepsTaken::mean);
     let finer = twin.stepped(|_, stepping| {
-        stepping.substeps *= 2;
+        stepping.substeps = (2 * stepping.substeps.max(taken)).min(2 * MOST_SUBSTEPS);
         stepping.tolerance *= FINER;
     });
     let Some(finer) = finer else {
@@ -69,7 +78,7 @@ pub(crate) enum StepLength {
     Unknown(SimulationError),
 }
 
-/// Compares runs with the step and half of it; `None` for a black box and in discrete time.
+/// Compares runs with the steps taken and half of them; `None` for a black box and in discrete time.
 pub(crate) fn step_length(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<StepLength> {
     let equations = (twin.equations()).filter(|own| own.integrator() != Integrator::Discrete)?;
     let known = step_error(twin, theta, drive)
@@ -98,23 +107,67 @@ pub(crate) fn step_length(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<S
     if coarse.is_empty() {
         return Some(StepLength::Fine);
     }
-    if equations.workspace().steps_taken().is_some() {
-        let finer = equations.stepping().tolerance * FINER;
-        let tolerance = number(finer.max(*TOLERANCES.start()));
-        return Some(StepLength::Coarse(format!(
-            "too long: with finer ones, {}; give the study tolerance = {tolerance}",
-            coarse.join("; ")
-        )));
-    }
-    let substeps = (4 * equations.stepping().substeps).min(MOST_SUBSTEPS);
-    let finer = match equations.integrator() {
-        Integrator::Euler => "runge-kutta-4",
-        _ => "adaptive",
+    let settles = |finer: &Twin| {
+        let errors = step_error(finer, theta, drive);
+        errors.is_ok_and(|errors| {
+            let mut all = errors.iter().zip(&levels);
+            all.all(|((_, error), (level, _))| error <= level)
+        })
+    };
+    let remedies: Vec<String> = finer_steps(twin, theta, drive)
+        .into_iter()
+        .filter_map(|kind| kind.into_iter().find(|(_, finer)| settles(finer)))
+        .map(|(remedy, _)| remedy)
+        .collect();
+    let remedy = match remedies.is_empty() {
+        false => format!("give the study {}", remedies.join(", or ")),
+        true => "no finer step that was tried settles it: rates may jump there, or runs of this twin follow their smallest errors".into(),
+    };
+    let finer = match equations.workspace().steps_taken() {
+        Some(_) => "finer ones",
+        None => "half the step",
     };
     Some(StepLength::Coarse(format!(
-        "too long: with half the step, {}; give the study {substeps} substeps, or the integrator {finer}",
+        "too long: with {finer}, {}; {remedy}",
         coarse.join("; ")
     )))
+}
+
+/// Returns twins with finer steps, by kind of remedy, the cheapest first, each with what a study says for it.
+fn finer_steps(twin: &Twin, theta: &[f64], drive: &Drive) -> [Vec<(String, Twin)>; 2] {
+    let Some((rule, stepping)) = twin.integration() else {
+        return [vec![], vec![]];
+    };
+    let taken = twin.steps_taken(theta, drive);
+    let now = taken.map_or(stepping.substeps, |taken| {
+        taken.mean().max(stepping.substeps)
+    });
+    let more = [4, 16, 64].into_iter().filter_map(|factor| {
+        let many = (factor * now).min(MOST_SUBSTEPS);
+        let finer = twin.stepped(|_, stepping| stepping.substeps = many)?;
+        Some((format!("{many} substeps"), finer))
+    });
+    let other: Vec<(String, Twin)> = match taken {
+        Some(_) => {
+            let tolerance = (stepping.tolerance * FINER).max(*TOLERANCES.start());
+            let finer = twin.stepped(|_, stepping| stepping.tolerance = tolerance);
+            let finer = finer.filter(|_| tolerance < stepping.tolerance);
+            let text = format!("tolerance = {}", number(tolerance));
+            finer.map(|finer| (text, finer)).into_iter().collect()
+        }
+        None => RULES
+            .into_iter()
+            .filter(|(other, _)| *other != rule)
+            .filter_map(|(other, name)| {
+                let finer = twin.stepped(|rule, _| *rule = other)?;
+                Some((format!("the integrator {name}"), finer))
+            })
+            .collect(),
+    };
+    match taken {
+        Some(_) => [other, more.collect()],
+        None => [more.collect(), other],
+    }
 }
 
 /// Limit of each output's move, and the limit's name.

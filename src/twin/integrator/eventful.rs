@@ -1,7 +1,6 @@
 //! The way to the next sample of a twin with events.
 
-use super::path::{Path, Rates, Stretch, jumps};
-use super::schedule::{WayRules, limited};
+use super::path::{LimitsOfWay, Path, Rates, Stretch, jumps, limited};
 use super::watch::{EventCalls, EventWatch, EventsOfWay};
 use super::{Integrator, Now, Workspace};
 use crate::setting::number;
@@ -79,14 +78,13 @@ impl Workspace {
             inputs: &mut refined.inputs,
             drift,
             breaks: &breaks,
+            limits: LimitsOfWay::of(n, &refined.limits, &mut refined.within)
+                .filter(|_| self.schedule.is_some()),
         };
         let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
-        let rules = WayRules {
-            limits: &refined.limits,
-            events: Some((&events, watches[0].clone())),
-        };
+        let of_centre = Some((&events, watches[0].clone()));
         let stretches = match &mut self.schedule {
-            Some(schedule) => schedule.chosen(&mut path, &mut x[..n].to_vec(), &rules),
+            Some(schedule) => schedule.chosen(&mut path, &mut x[..n].to_vec(), &of_centre),
             None => path.equal(refined.substeps),
         };
         if stretches.is_empty() {

@@ -13,8 +13,8 @@ mod watch;
 
 use crate::twin::Interval;
 use eventful::EventMemory;
-use path::{Path, Rates, Stretch, jumps};
-use schedule::{SubstepSchedule, limited};
+use path::{LimitsOfWay, Path, Rates, Stretch, jumps, limited};
+use schedule::SubstepSchedule;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::ops::RangeInclusive;
@@ -257,6 +257,8 @@ struct Refined {
     limits: Vec<(usize, Interval)>,
     /// Inputs at a stage.
     inputs: Vec<f64>,
+    /// Points at a stage, within their limits.
+    within: Vec<f64>,
 }
 
 impl Workspace {
@@ -279,6 +281,7 @@ impl Workspace {
                 substeps: stepping.substeps.max(1),
                 limits: felt(limits),
                 inputs: vec![0.0; holds.len()],
+                within: vec![],
             }),
             schedule,
             events: EventMemory::default(),
@@ -351,8 +354,9 @@ impl Workspace {
                     inputs: &mut refined.inputs,
                     drift,
                     breaks: jumps(now),
+                    limits: LimitsOfWay::of(n, &refined.limits, &mut refined.within),
                 };
-                schedule.carry(&mut path, x, &refined.limits);
+                schedule.carry(&mut path, x);
             }
             None => {
                 let rule = self.integrator;

@@ -1,6 +1,7 @@
 //! The way from one sample to the next: rates at any part of it, with the inputs there.
 
 use super::{Hold, Now};
+use crate::twin::Interval;
 
 /// A stretch of the way, in shares of it.
 #[derive(Debug, Clone, Copy)]
@@ -21,6 +22,52 @@ pub(super) struct Path<'p, 'n> {
     pub drift: &'p mut Rates<'p>,
     /// Shares of the way that no step goes over, in order.
     pub breaks: &'p [f64],
+    /// Limits of the states on the way; `None` where they act at the ends of steps alone.
+    pub limits: Option<LimitsOfWay<'p>>,
+}
+
+/// Limits that hold anywhere on a way.
+pub(super) struct LimitsOfWay<'p> {
+    /// Number of states of a point.
+    states: usize,
+    /// Limits that are felt, by state.
+    felt: &'p [(usize, Interval)],
+    /// Buffer: points within their limits.
+    within: &'p mut Vec<f64>,
+}
+
+impl<'p> LimitsOfWay<'p> {
+    /// Those of points of so many states; `None` where no limit is felt.
+    pub fn of(
+        states: usize,
+        felt: &'p [(usize, Interval)],
+        within: &'p mut Vec<f64>,
+    ) -> Option<Self> {
+        let limits = Self {
+            states,
+            felt,
+            within,
+        };
+        (!felt.is_empty()).then_some(limits)
+    }
+
+    /// Calls equations with points within their limits; a rate that leads out of a limit is zero.
+    fn rates(&mut self, drift: &mut Rates<'_>, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        self.within.clear();
+        self.within.extend_from_slice(x);
+        limited(self.states, self.within, self.felt);
+        drift(now, self.within, dx);
+        for &(j, limit) in self.felt {
+            let points = self.within.iter().zip(&mut *dx);
+            for (x, dx) in points.skip(j).step_by(self.states) {
+                if *x >= limit.high() {
+                    *dx = dx.min(0.0);
+                } else if *x <= limit.low() {
+                    *dx = dx.max(0.0);
+                }
+            }
+        }
+    }
 }
 
 impl Path<'_, '_> {
@@ -52,7 +99,42 @@ impl Path<'_, '_> {
             between.inputs_at(at, middle, self.now.u, self.inputs);
             stage.u = self.inputs;
         }
-        (self.drift)(&stage, x, dx);
+        match &mut self.limits {
+            Some(limits) => limits.rates(self.drift, &stage, x, dx),
+            None => (self.drift)(&stage, x, dx),
+        }
+    }
+
+    /// Puts points into the limits.
+    pub fn limit(&self, x: &mut [f64]) {
+        if let Some(limits) = &self.limits {
+            limited(limits.states, x, limits.felt);
+        }
+    }
+
+    /// Sets errors of points to those that are left within the limits: what is beyond one for both orders has no error.
+    pub fn limit_errors(&self, x: &[f64], errors: &mut [f64]) {
+        let Some(limits) = &self.limits else {
+            return;
+        };
+        for &(j, limit) in limits.felt {
+            let points = x.iter().zip(&mut *errors);
+            for (x, error) in points.skip(j).step_by(limits.states) {
+                *error = limit.clamp(*x) - limit.clamp(*x - *error);
+            }
+        }
+    }
+
+    /// Sign of a change of state j, at `x` with this rate, that shows derivatives: on the side that the state moves to.
+    pub fn side(&self, j: usize, x: f64, rate: f64) -> f64 {
+        let limits = self.limits.iter().flat_map(|limits| limits.felt);
+        for (_, limit) in limits.filter(|(of, _)| *of == j) {
+            let is_free = rate != 0.0;
+            if x >= limit.high() && is_free || x <= limit.low() && !is_free {
+                return -1.0;
+            }
+        }
+        1.0
     }
 
     /// Calls `with` the time and the inputs at a share of the way.
@@ -87,6 +169,15 @@ impl Path<'_, '_> {
     pub fn next_break(&self, from: f64) -> f64 {
         let mut breaks = self.breaks.iter().copied();
         breaks.find(|at| from < *at).unwrap_or(1.0)
+    }
+}
+
+/// Puts points of so many states into their limits.
+pub(super) fn limited(states: usize, x: &mut [f64], limits: &[(usize, Interval)]) {
+    for &(j, limit) in limits {
+        for x in x.iter_mut().skip(j).step_by(states) {
+            *x = limit.clamp(*x);
+        }
     }
 }
 

@@ -131,7 +131,8 @@ impl Rosenbrock {
             for (p, stage) in self.stage.chunks_exact_mut(n).enumerate() {
                 let rate = first[p * n + j];
                 let size = x[p * n + j].abs().max(sizes[j]).max((h * rate).abs());
-                stage[j] += HALF_DIGITS * size.max(f64::MIN_POSITIVE.sqrt());
+                let side = path.side(j, x[p * n + j], rate);
+                stage[j] += side * HALF_DIGITS * size.max(f64::MIN_POSITIVE.sqrt());
             }
             path.rates(of, 0.0, &self.stage, now);
             for (p, matrix) in matrices.iter_mut().enumerate() {

@@ -8,7 +8,6 @@ use super::watch::{EventWatch, EventsOfWay, StepBy};
 use super::{Integrator, MOST_SUBSTEPS, Stepping};
 use crate::math::three_digits;
 use crate::setting::number;
-use crate::twin::Interval;
 use serde::Serialize;
 
 /// Share of the longest step that the tolerance allows: a step that fails costs as much as one that does not.
@@ -21,8 +20,9 @@ const MANY: usize = 32;
 /// Lengths of two steps that tell rates that jump from those that are stiff, over the length that the tolerance allows: both are beyond it, and
 /// not so far that all detail is lost.
 const JUMPS: [f64; 2] = [2.0, 16.0];
-/// Steps of one sample of several points after which jumps of rates are no longer followed, as each point meets them at its own time; of a
-/// single run [`MANY`], which locate some jumps. Half gives up before a jump that all meet at one time is located, twice as many cost twice.
+/// Steps of one sample of several points after which jumps of rates are no longer followed, as each point meets them at its own time. Half
+/// gives up before a jump that all meet at one time is located, twice as many cost twice. Of a single run [`MANY`] times as many, as a jump is
+/// located in some thirty.
 const FEW: usize = 8;
 /// Least number of steps of one length in a sample where rates jump again and again, as dry friction does at rest: the time of a jump is known
 /// to a fraction of a step. With a quarter of them the evidence of dry friction in a pendulum came out twelve nats low; twice as many halve what is
@@ -57,6 +57,11 @@ impl StepsTaken {
             most: self.most.max(other.most),
             implicit: self.implicit + other.implicit,
         }
+    }
+
+    /// Substeps of a sample, rounded up.
+    pub(crate) fn mean(self) -> usize {
+        self.substeps.div_ceil(self.samples.max(1))
     }
 
     /// As a sentence has them: `adaptive steps, 3.4 a sample, at most 12`.
@@ -117,13 +122,8 @@ enum SampleSteps {
     Many { covered: f64 },
 }
 
-/// Limits and events that the steps of a way heed beside the tolerance.
-#[derive(Clone)]
-pub(super) struct WayRules<'c> {
-    pub limits: &'c [(usize, Interval)],
-    /// All events, and what the one point that is carried has had of them.
-    pub events: Option<(&'c EventsOfWay<'c>, EventWatch)>,
-}
+/// All events of a way, and what the one point that is carried has had of them; `None` where steps heed the tolerance alone.
+pub(super) type WayEvents<'c> = Option<(&'c EventsOfWay<'c>, EventWatch)>;
 
 /// Substeps of the way to the next sample.
 #[derive(Debug, Clone)]
@@ -209,19 +209,14 @@ impl SubstepSchedule {
 
     /// Carries points of one filter to the next sample; states are put into their limits behind each step. Points that follow over the same way
     /// take the steps of the first ones.
-    pub fn carry(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], limits: &[(usize, Interval)]) {
-        let n = self.sizes.len();
-        if n == 0 {
+    pub fn carry(&mut self, path: &mut Path<'_, '_>, x: &mut [f64]) {
+        if self.sizes.is_empty() {
             return;
         }
         let way = (path.now.t, path.now.dt);
         if self.of != Some(way) {
             self.of = Some(way);
-            let rules = WayRules {
-                limits,
-                events: None,
-            };
-            return self.choose(path, x, &rules);
+            return self.choose(path, x, &None);
         }
         if self.stretches.is_empty() {
             // The first ones gave up.
@@ -229,7 +224,7 @@ impl SubstepSchedule {
         }
         for i in 0..self.stretches.len() {
             self.step(path, self.stretches[i], x, None);
-            limited(n, x, limits);
+            path.limit(x);
         }
     }
 
@@ -238,10 +233,10 @@ impl SubstepSchedule {
         &mut self,
         path: &mut Path<'_, '_>,
         x: &mut [f64],
-        rules: &WayRules<'_>,
+        events: &WayEvents<'_>,
     ) -> Vec<Stretch> {
         self.of = None;
-        self.choose(path, x, rules);
+        self.choose(path, x, events);
         self.stretches.clone()
     }
 
@@ -261,7 +256,7 @@ impl SubstepSchedule {
     }
 
     /// Chooses the method and the substeps of this way, and takes them.
-    fn choose(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], rules: &WayRules<'_>) {
+    fn choose(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], events: &WayEvents<'_>) {
         let mut buffers = std::mem::take(&mut self.buffers);
         buffers.begin(x, &self.sizes);
         let was_rough = std::mem::take(&mut self.is_even);
@@ -272,23 +267,23 @@ impl SubstepSchedule {
         };
         let mut outcome = match begins_rough {
             true => SampleSteps::Rough,
-            false => self.tried(path, x, rules, (most, &mut buffers)),
+            false => self.tried(path, x, events, (most, &mut buffers)),
         };
         if let SampleSteps::Many { covered } = outcome {
             let explicit = MANY as f64 / covered.max(SHORTEST);
             let most = (explicit / WORTH).min(MOST_SUBSTEPS as f64) as usize;
             buffers.undo(x, &mut self.sizes);
             self.is_implicit = true;
-            outcome = self.tried(path, x, rules, (most, &mut buffers));
+            outcome = self.tried(path, x, events, (most, &mut buffers));
             if !matches!(outcome, SampleSteps::Done) {
                 self.is_implicit = false;
                 buffers.undo(x, &mut self.sizes);
-                outcome = self.tried(path, x, rules, (usize::MAX, &mut buffers));
+                outcome = self.tried(path, x, events, (usize::MAX, &mut buffers));
             }
         }
         if matches!(outcome, SampleSteps::Rough) {
             buffers.undo(x, &mut self.sizes);
-            self.take_even_steps(path, x, (rules, &mut buffers.trial));
+            self.take_even_steps(path, x, (events, &mut buffers.trial));
         }
         self.buffers = buffers;
         self.taken.samples += 1;
@@ -302,11 +297,11 @@ impl SubstepSchedule {
         &mut self,
         path: &mut Path<'_, '_>,
         x: &mut [f64],
-        rules: &WayRules<'_>,
+        events: &WayEvents<'_>,
         (most, buffers): (usize, &mut ScheduleBuffers),
     ) -> SampleSteps {
         let (n, dt) = (self.sizes.len(), path.now.dt);
-        let mut rules = rules.clone();
+        let mut events = events.clone();
         let order = match self.is_implicit {
             true => rosenbrock::ORDER,
             false => pair::ORDER,
@@ -314,7 +309,7 @@ impl SubstepSchedule {
         let ScheduleBuffers { trial, errors, .. } = buffers;
         let (mut next, mut from, mut steps, mut shortest) = (self.next, 0.0, 0, SHORTEST);
         let mut falls = Falls::default();
-        let patience = if x.len() > n { FEW } else { MANY };
+        let patience = if x.len() > n { FEW } else { FEW * MANY };
         self.stretches.clear();
         while from < 1.0 {
             if steps >= patience && falls.repeat() {
@@ -346,6 +341,7 @@ impl SubstepSchedule {
             };
             trial.copy_from_slice(x);
             self.step(path, of, trial, Some(errors));
+            path.limit_errors(trial, errors);
             let size = self.largest((x, trial), errors);
             falls.see(size <= 1.0, self.explicit.reach());
             let factor = match size.is_finite() {
@@ -361,7 +357,7 @@ impl SubstepSchedule {
             }
             if size <= 1.0 || longest <= shortest {
                 let reached = if parts == 1.0 { end } else { from + of.length };
-                from = self.keep(path, &mut rules, (of, reached), (x, trial));
+                from = self.keep(path, &mut events, (of, reached), (x, trial));
             }
         }
         self.next = next;
@@ -385,6 +381,7 @@ impl SubstepSchedule {
             let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
             let of = Stretch { from, length };
             self.explicit.step(path, of, &mut trial, Some(&mut errors));
+            path.limit_errors(&trial, &mut errors);
             self.largest((x, &trial), &errors)
         });
         let order = (errors[1] / errors[0]).ln() / (lengths[1] / lengths[0]).ln();
@@ -395,12 +392,12 @@ impl SubstepSchedule {
     fn keep(
         &mut self,
         path: &mut Path<'_, '_>,
-        rules: &mut WayRules<'_>,
+        events: &mut WayEvents<'_>,
         (mut of, mut reached): (Stretch, f64),
         (x, trial): (&mut [f64], &mut [f64]),
     ) -> f64 {
         let n = self.sizes.len();
-        if let Some((events, watch)) = &mut rules.events {
+        if let Some((events, watch)) = events {
             let mut step = |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| {
                 self.step(path, of, x, None);
             };
@@ -415,7 +412,7 @@ impl SubstepSchedule {
             }
         }
         x.copy_from_slice(trial);
-        limited(n, x, rules.limits);
+        path.limit(x);
         self.see(&x[..n]);
         self.stretches.push(of);
         reached
@@ -426,7 +423,7 @@ impl SubstepSchedule {
         &mut self,
         path: &mut Path<'_, '_>,
         x: &mut [f64],
-        (rules, trial): (&WayRules<'_>, &mut [f64]),
+        (events, trial): (&WayEvents<'_>, &mut [f64]),
     ) {
         // Where rates are fast besides, as many as the smooth samples before took.
         let smooth = (path.now.dt / self.next).ceil() as usize;
@@ -434,7 +431,7 @@ impl SubstepSchedule {
         let steps = smooth.clamp(least, MOST_SUBSTEPS + self.spare);
         self.spare -= steps.saturating_sub(MOST_SUBSTEPS);
         let longest = 1.0 / steps as f64;
-        let (mut rules, mut from) = (rules.clone(), 0.0);
+        let (mut events, mut from) = (events.clone(), 0.0);
         self.is_even = true;
         self.stretches.clear();
         while from < 1.0 {
@@ -447,7 +444,7 @@ impl SubstepSchedule {
             trial.copy_from_slice(x);
             self.step(path, of, trial, None);
             let reached = if parts == 1.0 { end } else { from + of.length };
-            from = self.keep(path, &mut rules, (of, reached), (x, trial));
+            from = self.keep(path, &mut events, (of, reached), (x, trial));
         }
     }
 
@@ -497,14 +494,5 @@ impl ScheduleBuffers {
     fn undo(&self, x: &mut [f64], sizes: &mut [f64]) {
         x.copy_from_slice(&self.start);
         sizes.copy_from_slice(&self.sizes);
-    }
-}
-
-/// Puts points into their limits.
-pub(super) fn limited(n: usize, x: &mut [f64], limits: &[(usize, Interval)]) {
-    for &(j, limit) in limits {
-        for x in x.iter_mut().skip(j).step_by(n) {
-            *x = limit.clamp(*x);
-        }
     }
 }

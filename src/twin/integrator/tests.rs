@@ -54,6 +54,7 @@ fn convergence_orders() {
                 inputs: &mut [],
                 drift: &mut pendulum,
                 breaks: &[],
+                limits: None,
             };
             match is_implicit {
                 true => implicit.step(&mut path, of, (&[1.0, 1.0], &mut x), None),
@@ -77,21 +78,84 @@ fn carried<const N: usize>(
     (t, samples): (f64, usize),
     rates: impl Fn(f64, &[f64], &mut [f64]),
 ) -> ([f64; N], StepsTaken) {
+    let (mut x, limits) = (start, [Interval::EVERYTHING; N]);
+    let taken = carry_within(&limits, (rule, tolerance), &mut x, (t, samples), rates);
+    (x, taken)
+}
+
+/// Carries points of as many states as limits to `t`, in samples of this length.
+fn carry_within(
+    limits: &[Interval],
+    (rule, tolerance): (Integrator, f64),
+    x: &mut [f64],
+    (t, samples): (f64, usize),
+    rates: impl Fn(f64, &[f64], &mut [f64]),
+) -> StepsTaken {
     let stepping = Stepping {
         tolerance,
         ..Stepping::default()
     };
-    let mut work = Workspace::of(&[], &[Interval::EVERYTHING; N], (rule, stepping), &[]);
-    let (mut x, dt) = (start, t / samples as f64);
+    let mut work = Workspace::of(&[], limits, (rule, stepping), &[]);
+    let (n, dt) = (limits.len(), t / samples as f64);
     for k in 0..samples {
         let now = Now::new(k as f64 * dt, dt, &[], &[]);
-        work.carry(N, &now, &mut x, |now, x, dx| {
-            for (x, dx) in x.chunks_exact(N).zip(dx.chunks_exact_mut(N)) {
+        work.carry(n, &now, x, |now, x, dx| {
+            for (x, dx) in x.chunks_exact(n).zip(dx.chunks_exact_mut(n)) {
                 rates(now.t, x, dx);
             }
         });
     }
-    (x, work.steps_taken().unwrap())
+    work.steps_taken().unwrap()
+}
+
+/// A level that rises and falls, held at 0.16 from 0.2 to 0.5 s, and what it fills; both also upside down.
+#[test]
+fn a_limit_holds_within_a_step() {
+    let levels = [0.16, -0.16];
+    for (rule, tolerance, error) in [
+        (Integrator::Adaptive, 1e-4, 1e-3),
+        (Integrator::Adaptive, 1e-7, 1e-6),
+        (Integrator::Adaptive, 1e-10, 1e-9),
+        (Integrator::Stiff, 1e-5, 1e-4),
+        (Integrator::Stiff, 1e-8, 1e-7),
+    ] {
+        for sign in [1.0, -1.0] {
+            let [low, high] = match sign > 0.0 {
+                true => [f64::NEG_INFINITY, levels[0]],
+                false => [levels[1], f64::INFINITY],
+            };
+            let limits = [Interval::new(low, high).unwrap(), Interval::EVERYTHING];
+            for points in [1, 3] {
+                let starts = [0.0, 0.02, -0.03];
+                let mut x: Vec<f64> = starts[..points]
+                    .iter()
+                    .flat_map(|z| [sign * z, 0.0])
+                    .collect();
+                let taken =
+                    carry_within(&limits, (rule, tolerance), &mut x, (1.0, 1), |t, x, dx| {
+                        dx[0] = sign * (1.0 - 2.0 * t);
+                        dx[1] = x[0];
+                    });
+                for (x, z) in x.chunks(2).zip(starts) {
+                    let met = 0.5 - (0.25 - 0.16 + z).sqrt();
+                    let rising = z * met + met.powi(2) / 2.0 - met.powi(3) / 3.0;
+                    let filled = rising + (1.0 - met) * 0.16 - 0.125 / 3.0;
+                    // Several points, each at the limit at its own time, take steps of one length.
+                    let allowed = if points > 1 {
+                        f64::max(error, 5e-4)
+                    } else {
+                        error
+                    };
+                    let errors = [sign * x[0] + 0.09, sign * x[1] - filled];
+                    let is_near = errors.iter().all(|error| error.abs() < allowed);
+                    assert!(
+                        is_near,
+                        "{rule:?} to {tolerance}, {points}: {errors:?}, {taken:?}"
+                    );
+                }
+            }
+        }
+    }
 }
 
 fn robertson(_: f64, x: &[f64], dx: &mut [f64]) {

@@ -40,7 +40,8 @@ pub(super) fn run(
     let (mut states, mut rates) = (Signal::zeros((samples, n)), Signal::zeros((samples, n)));
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let (mut y, mut rate) = (vec![0.0; p], vec![0.0; n]);
-    let mut dead_time = DeadTime::of(twin, system.theta, drive.dt());
+    let mut own = twin.complete(system.theta);
+    let mut dead_time = DeadTime::of(twin, &mut own, drive);
     let holds = conditions.holds(&twin.holds());
     // Of the record's inputs: what departs moves the ends of a curve.
     let bends = Bends::of(drive, &holds);
@@ -56,10 +57,10 @@ pub(super) fn run(
         }
         let moment = Moment::new(t, &x, &command);
         let u = sent.acting(k, plant.inputs(&moment, dt))?;
-        let theta = plant.theta(system.theta, &moment, dt);
+        let theta = plant.theta(&own, &moment, dt);
         let now = Now::new(t, dt, &u, &theta);
         twin.observe(&now, &x, &mut y);
-        dead_time.hold_back(&mut y);
+        dead_time.hold_back(t, &mut y);
         q.fill(0.0);
         r.fill(0.0);
         twin.noise(&now, &x, &mut q, &mut r);
