@@ -112,6 +112,5 @@ pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
 /// Parses a duration in seconds.
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let number: f64 = text.parse().map_err(|error| format!("{error}"))?;
-    Duration::try_from_secs_f64(number)
-        .map_err(|_| "expected a positive number of seconds".to_owned())
+    Duration::try_from_secs_f64(number).map_err(|_| "choose seconds from 0 to 1e19".to_owned())
 }

@@ -106,7 +106,7 @@ impl Remedy for RecordError {
                 "`truetwin resample R.csv --step {} --out R2.csv`; `truetwin fit` and `truetwin diagnose` take such records",
                 number(*expected)
             ),
-            Self::Start(_) => "[start] of the study file".into(),
+            Self::Start(_) => "`at` of [start] in the study file, or of a state's start".into(),
             Self::OneStep => "`truetwin resample R.csv --step S --out R2.csv`".into(),
             Self::Channels { .. } => "`truetwin twins` lists the twins".into(),
             Self::Columns { .. } => {

@@ -25,6 +25,18 @@ pub(super) enum Node {
     If(Id, Id, Id),
 }
 
+impl Node {
+    /// Returns its operands, and how many there are.
+    pub fn operands(self) -> ([Id; 3], usize) {
+        match self {
+            Self::One(_, a) => ([a; 3], 1),
+            Self::Two(_, a, b) => ([a, b, b], 2),
+            Self::If(c, a, b) => ([c, a, b], 3),
+            _ => ([0; 3], 0),
+        }
+    }
+}
+
 /// The most that a value depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Varies {
@@ -64,6 +76,35 @@ impl Graph {
             Node::Number(bits) => Some(f64::from_bits(bits)),
             _ => None,
         }
+    }
+
+    /// Returns which values these need, themselves too.
+    pub fn needed(&self, ids: &[Id]) -> Vec<bool> {
+        let mut needed = vec![false; self.len()];
+        ids.iter().for_each(|id| needed[*id] = true);
+        for id in (0..self.len()).rev() {
+            if needed[id] {
+                let (of, count) = self.nodes[id].0.operands();
+                of[..count].iter().for_each(|id| needed[*id] = true);
+            }
+        }
+        needed
+    }
+
+    /// Returns these values with others in place of some states.
+    pub fn with_states(&mut self, ids: &[Id], states: &HashMap<usize, Id>) -> Vec<Id> {
+        let needed = self.needed(ids);
+        let mut new: Vec<Id> = (0..self.len()).collect();
+        for id in (0..new.len()).filter(|id| needed[*id]) {
+            new[id] = match self.nodes[id].0 {
+                Node::State(state) => states.get(&state).copied().unwrap_or(id),
+                Node::One(operation, a) => self.one(operation, new[a]),
+                Node::Two(operation, a, b) => self.two(operation, new[a], new[b]),
+                Node::If(condition, a, b) => self.choice(new[condition], new[a], new[b]),
+                _ => id,
+            };
+        }
+        ids.iter().map(|id| new[*id]).collect()
     }
 
     pub fn number(&mut self, value: f64) -> Id {

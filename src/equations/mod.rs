@@ -23,6 +23,7 @@
 //! | words and signs of an expression; its operations in order | `expression/` |
 //! | names, definitions, common parts, constants | `names.rs`, `graph.rs` |
 //! | operations over blocks | `tape/` |
+//! | times at which rates jump | `jumps.rs` |
 //! | events: their conditions, times and changes | `event/` |
 //! | the equations that they are | `program.rs` |
 //! | the twin | `twin.rs`, `declared.rs` |
@@ -34,6 +35,7 @@ mod event;
 mod expression;
 mod file;
 mod graph;
+mod jumps;
 mod names;
 mod place;
 mod program;

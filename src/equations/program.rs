@@ -1,5 +1,6 @@
 //! Computes the expressions of a text: its equations, point after point and in blocks.
 
+use super::jumps::Jumps;
 use super::tape::{LanesFeed, OperationTape, PointsFeed, TapeFeed};
 use crate::math::{Kernel, LANES, Lanes, widest};
 use crate::twin::{Blocks, Integrator, Interval, Layout, Now, Outline, StateSpace, Stepping};
@@ -20,6 +21,8 @@ pub(crate) struct Program {
 #[derive(Debug)]
 pub(super) struct Tapes {
     pub drift: OperationTape,
+    /// Times at which the drift jumps.
+    pub jumps: Option<Jumps>,
     pub observe: OperationTape,
     /// Levels of states, then of outputs.
     pub noise: OperationTape,
@@ -164,6 +167,10 @@ impl StateSpace for Program {
                 *x = f64::NAN;
             }
         }
+    }
+
+    fn jumps(&self, now: &Now<'_>) -> Option<Vec<f64>> {
+        Some(self.tapes.jumps.as_ref()?.times(now))
     }
 
     fn integrator(&self) -> Integrator {

@@ -394,3 +394,41 @@ fn texts_that_are_nearly_right_do_no_harm() {
     }
     assert!(accepted > 10, "{accepted}");
 }
+
+/// A level that meets its limits between rows, and what follows it: as in 2048 steps of Euler's rule, whether a limit is a number or a parameter.
+#[test]
+fn limits_hold_between_rows() {
+    let run = |high: &str, record: &str, parts: usize| {
+        let text = format!(
+            "[parameters]\na = {{ prior = [0.1, 2.0] }}\ntop = {{ prior = [0.1, 1.0] }}\n[inputs]\nu = {{}}\n\
+             [states]\nx = {{ rate = \"-0.1*x + z\", start = 0.0 }}\n\
+             z = {{ rate = \"-a*z + 3*u\", start = 0.0, limits = [-0.2, {high}] }}\n\
+             [outputs]\ny = {{ value = \"x\", noise = 0.05 }}\n[record]\n{record}"
+        );
+        let twin = Arc::new(Equations::parse(&text).unwrap());
+        let u = Signal::from_shape_fn((60 * parts, 1), |(k, _)| [1.0, -1.0][k / (10 * parts) % 2]);
+        let drive = Drive::new(0.3 / parts as f64, u).unwrap();
+        let y = twin.free_run(&[0.8, 0.3], &drive).unwrap();
+        y.iter().step_by(parts).copied().collect::<Vec<f64>>()
+    };
+    let expected = run("0.3", "integrator = 'euler'", 2048);
+    let worst = |y: &[f64]| {
+        let errors = y.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+        errors.fold(0.0, f64::max)
+    };
+    for high in ["0.3", "\"top\""] {
+        for (record, parts) in [
+            ("", 1),
+            ("integrator = 'stiff'", 1),
+            ("integrator = 'runge-kutta-4'", 16),
+            ("integrator = 'runge-kutta-4'\nsubsteps = 16", 1),
+        ] {
+            let error = worst(&run(high, record, parts));
+            assert!(error < 1e-3, "{high}, {record}: {error}");
+        }
+    }
+    // Limits that parameters set in the wrong order hold nothing, and no rate.
+    let free = run("1e9", "", 1);
+    let crossed = run("\"top - 1\"", "", 1);
+    assert!((free[9] - crossed[9]).abs() < 1e-6 && worst(&free) > 0.5);
+}

@@ -100,16 +100,6 @@ impl Slots {
     }
 }
 
-/// Operands of a value.
-fn operands(node: Node) -> ([Id; 3], usize) {
-    match node {
-        Node::One(_, a) => ([a; 3], 1),
-        Node::Two(_, a, b) => ([a, b, b], 2),
-        Node::If(c, a, b) => ([c, a, b], 3),
-        _ => ([0; 3], 0),
-    }
-}
-
 impl OperationTape {
     /// Writes what these values of a graph need.
     pub fn new(graph: &Graph, outputs: &[Id]) -> Self {
@@ -120,7 +110,7 @@ impl OperationTape {
         }
         for id in (0..graph.len()).rev() {
             if needed[id] {
-                let (of, count) = operands(graph.get(id).0);
+                let (of, count) = graph.get(id).0.operands();
                 for &operand in &of[..count] {
                     needed[operand] = true;
                     last[operand] = last[operand].max(id);
@@ -195,7 +185,7 @@ impl OperationTape {
             Node::Two(operation, ..) => Work::Two(operation),
             Node::If(..) => Work::If,
         };
-        let (ids, count) = operands(node);
+        let (ids, count) = node.operands();
         let of = ids.map(|id| slots.get(id));
         // A result may stand where an operand stood: each group is read before it is written.
         slots.release(id, &ids[..count]);

@@ -208,6 +208,10 @@ impl StateSpace for ServedEquations {
         self.text.constrain(now, x);
     }
 
+    fn jumps(&self, now: &Now<'_>) -> Option<Vec<f64>> {
+        self.text.jumps(now).filter(|_| self.motion.is_none())
+    }
+
     fn check_parameters(&self, _: &[f64], _: f64) -> Result<(), SimulationError> {
         self.asker.health.check()
     }

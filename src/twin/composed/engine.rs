@@ -113,6 +113,7 @@ impl<T: StateSpace> Engine for T {
             };
             let carry = |x: &mut [f64], work: &mut Workspace| {
                 self.update_points(now, Layout::dense(n), x);
+                work.jump_at(|see| see(now, self.jumps(now)));
                 work.carry(n, now, x, drift);
             };
             let constrain = |x: &mut [f64]| self.constrain_points(now, Layout::dense(n), x);
@@ -281,6 +282,7 @@ fn carry<T: StateSpace>(
         states: x.len(),
         inside: &|now, _, then| then(now),
     };
+    work.jump_at(|see| see(now, twin.jumps(now)));
     work.carry_with_events(&calls, x.len(), now, x, drift);
 }
 

@@ -174,6 +174,20 @@ impl Composed {
         x: &mut [f64],
         work: &mut Workspace,
     ) {
+        let centre = x.get(..n);
+        work.jump_at(|see| self.inside(now, centre, |own| see(own, self.own.jumps(own))));
+        self.carry_over_jumps(n, (now, own), x, work);
+    }
+
+    /// As [`carry`](Self::carry), where the buffers know where rates jump.
+    #[inline(always)]
+    fn carry_over_jumps(
+        &self,
+        n: usize,
+        (now, own): (&Now<'_>, Option<&Now<'_>>),
+        x: &mut [f64],
+        work: &mut Workspace,
+    ) {
         // One step of Euler's rule has its rates there alone.
         let own = own.filter(|_| work.is_plain());
         let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| match own {
@@ -276,9 +290,14 @@ impl Composed {
         for (now, x) in now.iter().zip(joined.chunks_exact_mut(each)) {
             self.remember(now, None, x);
         }
+        work.jump_at(|see| {
+            for now in now {
+                self.inside(now, None, |own| see(own, self.own.jumps(own)));
+            }
+        });
         if work.is_adaptive() {
             let mut first = joined[..each].to_vec();
-            self.carry(n, (&now[0], None), &mut first, work);
+            self.carry_over_jumps(n, (&now[0], None), &mut first, work);
         }
         work.carry(n, &now[0], &mut joined, |stage, x, dx| {
             self.rates_joined((now, stage), each, x, dx);

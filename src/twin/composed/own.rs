@@ -107,6 +107,7 @@ impl OwnEquations {
         let n = points.shifts.len();
         points.limit(n);
         let moving = &mut points.all[..points.moving * n];
+        work.jump_at(|see| see(now, self.jumps(now)));
         work.carry(n, now, moving, |now, x, dx| {
             self.drift_points(now, Layout::dense(n), x, dx);
         });
@@ -153,6 +154,7 @@ impl OwnEquations {
         let n = points.shifts.len();
         let moving = &mut points.all[..points.moving * n];
         let (each, mut all) = (moving.len(), joined(points.limits, now.len(), moving));
+        work.jump_at(|see| now.iter().for_each(|now| see(now, self.jumps(now))));
         if blocks.is_wide() && work.is_adaptive() {
             let mut first = all[..each].to_vec();
             work.carry(n, &now[0], &mut first, |now, x, dx| {

@@ -1,6 +1,6 @@
 //! The way to the next sample of a twin with events.
 
-use super::path::{LimitsOfWay, Path, Rates, Stretch, jumps, limited};
+use super::path::{LimitsOfWay, Path, Rates, Stretch, breaks, edge, limited};
 use super::watch::{EventCalls, EventWatch, EventsOfWay};
 use super::{Integrator, Now, Workspace};
 use crate::setting::number;
@@ -67,19 +67,16 @@ impl Workspace {
             times: &times,
             is_discrete,
         };
-        let mut breaks: Vec<f64> = (times.iter().map(|(share, _)| *share))
-            .chain(jumps(&way).iter().copied())
-            .filter(|share| *share > 0.0 && *share < 1.0)
-            .collect();
-        breaks.sort_unstable_by(f64::total_cmp);
-        breaks.dedup();
+        let jumps = refined.jumps.as_deref();
+        let breaks = breaks(&way, jumps, times.iter().map(|(share, _)| *share));
         let mut path = Path {
             now: &way,
             inputs: &mut refined.inputs,
             drift,
             breaks: &breaks,
+            edge: edge(&way, jumps),
             limits: LimitsOfWay::of(n, &refined.limits, &mut refined.within)
-                .filter(|_| self.schedule.is_some()),
+                .filter(|_| rule.is_between()),
         };
         let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
         let of_centre = Some((&events, watches[0].clone()));

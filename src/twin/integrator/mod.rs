@@ -13,7 +13,7 @@ mod watch;
 
 use crate::twin::Interval;
 use eventful::EventMemory;
-use path::{LimitsOfWay, Path, Rates, Stretch, jumps, limited};
+use path::{LimitsOfWay, Path, Rates, Stretch, breaks, edge, limited};
 use schedule::SubstepSchedule;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
@@ -259,6 +259,8 @@ struct Refined {
     inputs: Vec<f64>,
     /// Points at a stage, within their limits.
     within: Vec<f64>,
+    /// Shares of the way at which rates jump; `None` for rates that jump at no time of their own.
+    jumps: Option<Vec<f64>>,
 }
 
 impl Workspace {
@@ -273,6 +275,7 @@ impl Workspace {
         let is_refined = schedule.is_some()
             || !events.is_empty()
             || stepping.substeps > 1
+            || integrator.is_between() && !felt(limits).is_empty()
             || integrator != Integrator::Discrete && holds.iter().any(|hold| *hold != Hold::Zero);
         Self {
             stages: StepBuffers::of(limits.len()),
@@ -282,6 +285,7 @@ impl Workspace {
                 limits: felt(limits),
                 inputs: vec![0.0; holds.len()],
                 within: vec![],
+                jumps: None,
             }),
             schedule,
             events: EventMemory::default(),
@@ -318,6 +322,24 @@ impl Workspace {
         self.schedule.as_ref().map(SubstepSchedule::taken)
     }
 
+    /// Hears where rates jump on the next way, of all points that go it together: `tell` is called with what takes the times of each. Steps to
+    /// a tolerance end there.
+    pub(super) fn jump_at(
+        &mut self,
+        tell: impl FnOnce(&mut dyn FnMut(&Now<'_>, Option<Vec<f64>>)),
+    ) {
+        let (Some(_), Some(refined)) = (&self.schedule, &mut self.refined) else {
+            return;
+        };
+        refined.jumps = None;
+        tell(&mut |now, times| {
+            if let Some(times) = times {
+                let shares = times.into_iter().map(|at| (at - now.t) / now.dt);
+                refined.jumps.get_or_insert_default().extend(shares);
+            }
+        });
+    }
+
     /// Buffers of a single step.
     #[inline]
     pub(super) fn stages(&mut self) -> &mut StepBuffers {
@@ -349,11 +371,13 @@ impl Workspace {
         }
         match &mut self.schedule {
             Some(schedule) => {
+                let jumps = refined.jumps.as_deref();
                 let mut path = Path {
                     now,
                     inputs: &mut refined.inputs,
                     drift,
-                    breaks: jumps(now),
+                    breaks: &breaks(now, jumps, []),
+                    edge: edge(now, jumps),
                     limits: LimitsOfWay::of(n, &refined.limits, &mut refined.within),
                 };
                 schedule.carry(&mut path, x);
@@ -399,6 +423,11 @@ fn grown(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
 }
 
 impl Integrator {
+    /// Returns whether it takes rates where limits have not acted yet.
+    fn is_between(self) -> bool {
+        !matches!(self, Self::Euler | Self::Discrete)
+    }
+
     /// One step in place, the input held: `x(t)` becomes `x(t + Δt)` under `drift(now, x, dx)`.
     #[inline]
     pub(super) fn step(
@@ -423,6 +452,12 @@ impl Integrator {
     ) {
         let m = refined.substeps;
         let h = now.dt / m as f64;
+        let mut limits =
+            LimitsOfWay::of(n, &refined.limits, &mut refined.within).filter(|_| self.is_between());
+        let mut drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| match &mut limits {
+            Some(limits) => limits.rates(drift, now, x, dx),
+            None => drift(now, x, dx),
+        };
         for i in 0..m {
             if i > 0 {
                 limited(n, x, &refined.limits);
@@ -437,7 +472,7 @@ impl Integrator {
                 ..*now
             };
             let Some(between) = now.between else {
-                self.step(&sub, x, work, &mut *drift);
+                self.step(&sub, x, work, &mut drift);
                 continue;
             };
             let inputs = &mut refined.inputs;

@@ -2,6 +2,10 @@
 
 use super::{Hold, Now};
 use crate::twin::Interval;
+use smallvec::SmallVec;
+
+/// Least share of the way by which rates stay off jumps: no tolerance shows it. A tenth would do.
+const CLOSE: f64 = 1e-12;
 
 /// A stretch of the way, in shares of it.
 #[derive(Debug, Clone, Copy)]
@@ -22,6 +26,8 @@ pub(super) struct Path<'p, 'n> {
     pub drift: &'p mut Rates<'p>,
     /// Shares of the way that no step goes over, in order.
     pub breaks: &'p [f64],
+    /// Share of the way by which rates are taken inside a stretch at its ends: at the time of a jump itself they are those of one side.
+    pub edge: f64,
     /// Limits of the states on the way; `None` where they act at the ends of steps alone.
     pub limits: Option<LimitsOfWay<'p>>,
 }
@@ -52,7 +58,7 @@ impl<'p> LimitsOfWay<'p> {
     }
 
     /// Calls equations with points within their limits; a rate that leads out of a limit is zero.
-    fn rates(&mut self, drift: &mut Rates<'_>, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+    pub fn rates(&mut self, drift: &mut Rates<'_>, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
         self.within.clear();
         self.within.extend_from_slice(x);
         limited(self.states, self.within, self.felt);
@@ -88,7 +94,8 @@ impl Path<'_, '_> {
 
     /// Rates at a part of a stretch.
     pub fn rates(&mut self, of: Stretch, part: f64, x: &[f64], dx: &mut [f64]) {
-        let at = of.from + part * of.length;
+        let inside = self.edge.min(0.25 * of.length);
+        let at = of.from + (part * of.length).clamp(inside, of.length - inside);
         let mut stage = Now {
             t: self.time(at),
             dt: of.length * self.now.dt,
@@ -181,10 +188,33 @@ pub(super) fn limited(states: usize, x: &mut [f64], limits: &[(usize, Interval)]
     }
 }
 
-/// Shares of the way at which inputs jump.
-pub(super) fn jumps(now: &Now<'_>) -> &'static [f64] {
-    match now.between {
-        Some(between) if between.holds.contains(&Hold::Nearest) => &[0.5],
-        _ => &[],
+/// Shares of the way at which inputs jump, rates do and something else happens, in order.
+pub(super) fn breaks(
+    now: &Now<'_>,
+    jumps: Option<&[f64]>,
+    others: impl IntoIterator<Item = f64>,
+) -> SmallVec<[f64; 4]> {
+    let mut all: SmallVec<[f64; 4]> = others.into_iter().collect();
+    if now
+        .between
+        .is_some_and(|between| between.holds.contains(&Hold::Nearest))
+    {
+        all.push(0.5);
+    }
+    all.retain(|share| *share > 0.0 && *share < 1.0);
+    // Between an end of the way and a jump beside it there is no room for rates.
+    let edge = edge(now, jumps);
+    let jumps = jumps.unwrap_or_default().iter().copied();
+    all.extend(jumps.filter(|share| *share > edge && *share < 1.0 - edge));
+    all.sort_unstable_by(f64::total_cmp);
+    all.dedup();
+    all
+}
+
+/// Share of the way that rounding leaves of the time of a jump; 0 where rates do not jump at times.
+pub(super) fn edge(now: &Now<'_>, jumps: Option<&[f64]>) -> f64 {
+    match jumps {
+        Some(_) => CLOSE + 8.0 * f64::EPSILON * now.t.abs() / now.dt,
+        None => 0.0,
     }
 }

@@ -348,7 +348,10 @@ impl SubstepSchedule {
                 true => (SAFETY * size.powf(-1.0 / order)).clamp(CHANGE.0, CHANGE.1),
                 false => CHANGE.0,
             };
-            next = factor * of.length * dt;
+            // A step that a jump cuts short says little of the next.
+            let is_cut = path.edge > 0.0 && parts == 1.0 && size <= 1.0;
+            let shortened = if is_cut { next } else { 0.0 };
+            next = shortened.max(factor * of.length * dt);
             // A thousand steps with a thousandth of a state's size each are no way. At a jump of rates, a shortest step may have any error.
             let is_forced = shortest > SHORTEST && longest <= shortest;
             if is_forced && size.is_finite() && size > 1e-3 / self.tolerance {

@@ -3,7 +3,8 @@ use super::path::Stretch;
 use super::rosenbrock::Rosenbrock;
 use super::*;
 use crate::record::Drive;
-use crate::twin::{DigitalTwin, Event, Interval, Noise, Outline, Parameter, StateSpace};
+use crate::twin::{DigitalTwin, Event, Interval, Noise, Outline, Parameter, StateSpace, Twin};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Global error of ẋ = −x + t at t = 1, whose solution is 2e^{−t} + t − 1.
@@ -54,6 +55,7 @@ fn convergence_orders() {
                 inputs: &mut [],
                 drift: &mut pendulum,
                 breaks: &[],
+                edge: 0.0,
                 limits: None,
             };
             match is_implicit {
@@ -106,6 +108,56 @@ fn carry_within(
         });
     }
     work.steps_taken().unwrap()
+}
+
+/// A switch at a time that the equations tell, at the coarsest tolerance; one at a row, too.
+#[test]
+fn a_step_ends_at_a_jump_that_is_told() {
+    struct Switch;
+    impl StateSpace for Switch {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("at", "s", 1.0, 3.0))
+                .state("x", "1")
+                .output("y", "1")
+        }
+        fn drift(&self, now: &Now<'_>, _: &[f64], dx: &mut [f64]) {
+            dx[0] = if now.t > now.theta[0] { now.t } else { 0.0 };
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+        fn jumps(&self, now: &Now<'_>) -> Option<Vec<f64>> {
+            Some(vec![now.theta[0]])
+        }
+        fn integrator(&self) -> Integrator {
+            Integrator::Adaptive
+        }
+        fn stepping(&self) -> Stepping {
+            Stepping {
+                tolerance: *TOLERANCES.end(),
+                ..Stepping::default()
+            }
+        }
+    }
+    let drive = Drive::autonomous(2.0, 4).unwrap();
+    let twins = [
+        Twin::new(Switch),
+        Twin::from(Arc::new(Switch) as Arc<dyn DigitalTwin>),
+    ];
+    for at in [1.1_f64, 2.0, 2.7, 3.999] {
+        for twin in &twins {
+            let run = twin.free_run(&[at], &drive).unwrap();
+            for (k, y) in run.iter().enumerate() {
+                let t = 2.0 * k as f64;
+                let expected = 0.5 * (t * t - at * at).max(0.0);
+                assert!(
+                    (y - expected).abs() < 1e-9,
+                    "{at}, row {k}: {y}, {expected}"
+                );
+            }
+        }
+    }
 }
 
 /// A level that rises and falls, held at 0.16 from 0.2 to 0.5 s, and what it fills; both also upside down.
