@@ -1,5 +1,6 @@
 //! Twins with effects: each effect is a part of the twin.
 
+use super::Shape;
 use super::check::{check_effects, targets};
 use super::law::NOISE_ENTERS;
 use super::placed::{Effect, magnitude_unit};
@@ -113,6 +114,7 @@ fn part(base: &Twin, effect: &Effect, magnitudes: Range<usize>, known: &[String]
             by: by.clone(),
         }),
         is_dead_time: kind.is_dead_time(),
+        time: (kind.magnitudes().iter()).position(|m| m.shape == Shape::Time),
         ..LawPart::new(law, effect.key().to_string(), target, magnitudes)
     }
 }

@@ -2,10 +2,12 @@
 
 use super::*;
 use crate::effect::{Catalogue, EffectKind, Magnitude, OtherState};
+use crate::equations::Equations;
 use crate::record::{Drive, Signal};
 use crate::twin::fixture::Unseen;
 use crate::twin::{Acting, Hold, Noise, Stepping};
 use crate::twins::CascadedTanks;
+use std::sync::Arc;
 
 /// A run keeps two samples of a delay in its states, and holds its outputs back by the rest: that is the register of the law, to the
 /// last bits, and noise comes behind it.
@@ -93,6 +95,28 @@ fn a_delay_counts_seconds_where_steps_vary() {
             &expected,
             &format!("actuator {delay}"),
         );
+    }
+}
+
+/// A step of a parameter within a sample of adaptive steps acts at its time, smoothly: y = t, from then on 1.5 t' more.
+#[test]
+fn a_step_of_a_parameter_acts_at_its_time() {
+    let text = "[parameters]\nk = { prior = [0.5, 2.0] }\n[states]\nx = { rate = \"k\", start = 0.0 }\n\
+                [outputs]\ny = { value = \"x\", noise = 0.05 }";
+    let base = Twin::from(Arc::new(Equations::parse(text).unwrap()));
+    let step = Catalogue::default().effect("parameter-step", "k").unwrap();
+    let twin = augment(base, vec![step]).unwrap();
+    let drive = Drive::autonomous(2.0, 5).unwrap().beginning_at(100.0);
+    let run = |time: f64| twin.free_run(&[1.0, 0.5, time], &drive).unwrap();
+    for time in [0.7, 2.0, 3.1, 3.1 + 1e-7, 5.999] {
+        for (k, y) in run(time).iter().enumerate() {
+            let t = 2.0 * k as f64;
+            let expected = t + 0.5 * (t - time).max(0.0);
+            assert!(
+                (y - expected).abs() < 1e-9,
+                "{time}, row {k}: {y}, {expected}"
+            );
+        }
     }
 }
 

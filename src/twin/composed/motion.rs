@@ -175,8 +175,27 @@ impl Composed {
         work: &mut Workspace,
     ) {
         let centre = x.get(..n);
-        work.jump_at(|see| self.inside(now, centre, |own| see(own, self.own.jumps(own))));
+        work.jump_at(|see| self.see_jumps(now, centre, see));
         self.carry_over_jumps(n, (now, own), x, work);
+    }
+
+    /// Calls `see` with the times of a step at which rates jump, those of the equations and those of laws, each in its clock.
+    fn see_jumps(
+        &self,
+        now: &Now<'_>,
+        x: Option<&[f64]>,
+        see: &mut dyn FnMut(&Now<'_>, Option<Vec<f64>>),
+    ) {
+        self.inside(now, x, |own| see(own, self.own.jumps(own)));
+        for added in &self.parts.list {
+            if let TwinPart::Law(part) = &added.part
+                && let Some(time) = part.time
+            {
+                let late = now.t - self.parts.time(now, added.delays);
+                let at = now.first_time + part.m(now.theta)[time] + late;
+                see(now, Some(vec![at]));
+            }
+        }
     }
 
     /// As [`carry`](Self::carry), where the buffers know where rates jump.
@@ -292,7 +311,7 @@ impl Composed {
         }
         work.jump_at(|see| {
             for now in now {
-                self.inside(now, None, |own| see(own, self.own.jumps(own)));
+                self.see_jumps(now, None, see);
             }
         });
         if work.is_adaptive() {

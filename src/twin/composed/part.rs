@@ -165,6 +165,8 @@ pub(crate) struct LawPart {
     pub follows: Option<Follows>,
     /// `true` where it shows the signal as it was so many seconds ago, its first magnitude.
     pub is_dead_time: bool,
+    /// Magnitude that is a time in seconds after the first row, at which it may jump.
+    pub time: Option<usize>,
 }
 
 impl LawPart {
@@ -179,6 +181,7 @@ impl LawPart {
             memory: 0,
             follows: None,
             is_dead_time: false,
+            time: None,
         }
     }
 

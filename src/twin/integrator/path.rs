@@ -66,10 +66,9 @@ impl<'p> LimitsOfWay<'p> {
         for &(j, limit) in self.felt {
             let points = self.within.iter().zip(&mut *dx);
             for (x, dx) in points.skip(j).step_by(self.states) {
-                if *x >= limit.high() {
-                    *dx = dx.min(0.0);
-                } else if *x <= limit.low() {
-                    *dx = dx.max(0.0);
+                // What is no number stays so.
+                if *x >= limit.high() && *dx > 0.0 || *x <= limit.low() && *dx < 0.0 {
+                    *dx = 0.0;
                 }
             }
         }
