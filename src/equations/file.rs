@@ -4,8 +4,7 @@ use super::declared::{Declared, NoiseValue, StartValue};
 use super::entries::{TableEntry, entries};
 use super::error::EquationsError;
 use super::event::{EventText, events};
-use super::expression::Binary;
-use super::graph::{Graph, Id, Node, Varies};
+use super::graph::{Graph, Id, Varies};
 use super::jumps::Jumps;
 use super::names::{Meaning, Scope};
 use super::place::{SourceText, number};
@@ -19,7 +18,7 @@ use crate::storage::untrusted::{check_name, excerpt, message};
 use crate::twin::{
     Hold, Integrator, Interval, MOST_SUBSTEPS, Outline, Parameter, Stepping, TOLERANCES,
 };
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 use toml::Spanned;
@@ -157,7 +156,7 @@ fn read(source: SourceText<'_>, file: &DeTable<'_>) -> Result<Equations, Equatio
     let hold = reader.inputs(&inputs)?;
     let events = events(source, file, (&states, &mut reader.names))?;
     let named = states;
-    let mut states: Vec<StateText> =
+    let states: Vec<StateText> =
         (named.iter().map(|entry| reader.state(entry))).collect::<Result<_, _>>()?;
     reader.hold_switches(&named, &states, &events);
     let outputs: Vec<(Id, NoiseValue)> =
@@ -165,9 +164,6 @@ fn read(source: SourceText<'_>, file: &DeTable<'_>) -> Result<Equations, Equatio
     let (integrator, stepping) = integrator(source, file, reader.motion == Some("next"))?;
     let name = name(source, file)?;
     let is_discrete = integrator == Integrator::Discrete;
-    if !is_discrete {
-        hold_within(&mut reader.names.graph, &mut states);
-    }
     let rates: Vec<Id> = states.iter().map(|state| state.motion).collect();
     let jumps = Jumps::of(&mut reader.names.graph, &rates).filter(|_| !is_discrete);
     let graph = &reader.names.graph;
@@ -384,37 +380,6 @@ fn tapes(
         start: OperationTape::new(graph, &ids(&|state| state.start.mean)),
         deviation: OperationTape::new(graph, &ids(&|state| state.start.deviation)),
         ends: (!is_constant).then(|| OperationTape::new(graph, &ends)),
-    }
-}
-
-/// Takes rates at states within limits that parameters set, and for zero where they lead out of one: within a step, nothing else holds such a
-/// state. The integrator knows limits that are numbers.
-fn hold_within(graph: &mut Graph, states: &mut [StateText]) {
-    let moves = |state: &StateText| state.limits.iter().any(|id| graph.constant(*id).is_none());
-    let moving: Vec<usize> = (0..states.len()).filter(|i| moves(&states[*i])).collect();
-    let mut within = HashMap::new();
-    for &i in &moving {
-        let ([low, high], x) = (states[i].limits, graph.add(Node::State(i)));
-        let is_ordered = graph.two(Binary::Less, low, high);
-        let above = graph.two(Binary::Max, x, low);
-        let held = graph.two(Binary::Min, above, high);
-        within.insert(i, graph.choice(is_ordered, held, x));
-    }
-    let rates: Vec<Id> = states.iter().map(|state| state.motion).collect();
-    for (state, rate) in states.iter_mut().zip(graph.with_states(&rates, &within)) {
-        state.motion = rate;
-    }
-    let zero = graph.number(0.0);
-    for i in moving {
-        let ([low, high], x) = (states[i].limits, graph.add(Node::State(i)));
-        let is_ordered = graph.two(Binary::Less, low, high);
-        let rate = states[i].motion;
-        let [down, up] = [Binary::Min, Binary::Max].map(|end| graph.two(end, rate, zero));
-        let is_low = graph.two(Binary::LessEqual, x, low);
-        let is_high = graph.two(Binary::LessEqual, high, x);
-        let from_low = graph.choice(is_low, up, rate);
-        let held = graph.choice(is_high, down, from_low);
-        states[i].motion = graph.choice(is_ordered, held, rate);
     }
 }
 

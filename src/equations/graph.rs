@@ -91,22 +91,6 @@ impl Graph {
         needed
     }
 
-    /// Returns these values with others in place of some states.
-    pub fn with_states(&mut self, ids: &[Id], states: &HashMap<usize, Id>) -> Vec<Id> {
-        let needed = self.needed(ids);
-        let mut new: Vec<Id> = (0..self.len()).collect();
-        for id in (0..new.len()).filter(|id| needed[*id]) {
-            new[id] = match self.nodes[id].0 {
-                Node::State(state) => states.get(&state).copied().unwrap_or(id),
-                Node::One(operation, a) => self.one(operation, new[a]),
-                Node::Two(operation, a, b) => self.two(operation, new[a], new[b]),
-                Node::If(condition, a, b) => self.choice(new[condition], new[a], new[b]),
-                _ => id,
-            };
-        }
-        ids.iter().map(|id| new[*id]).collect()
-    }
-
     pub fn number(&mut self, value: f64) -> Id {
         self.add(Node::Number(value.to_bits()))
     }

@@ -13,91 +13,75 @@ const PARTS: usize = 8;
 /// Most jumps of a way: of more, steps of one length do. Half would do, too.
 const MOST: usize = 32;
 
-/// Values whose classes change where rates jump.
+/// Values that are the same but where rates jump.
 #[derive(Debug)]
 pub(super) struct Jumps {
     values: OperationTape,
-    /// The first values are margins, whose sign counts; of the others the whole part does.
-    margins: usize,
     count: usize,
     /// `false` where all follow inputs alone, which may be held.
     by_time: bool,
 }
 
 impl Jumps {
-    /// Creates those of these rates; `None` where they jump nowhere by time alone.
+    /// Creates those of these rates; `None` where they jump nowhere by time and inputs alone.
     pub fn of(graph: &mut Graph, rates: &[Id]) -> Option<Self> {
         let (needed, timed) = (graph.needed(rates), timed(graph));
-        let is_timed = |ids: &[Id]| {
-            let all: Option<Vec<bool>> = ids.iter().map(|id| timed[*id]).collect();
-            all.is_some_and(|all| all.contains(&true))
-        };
-        let (mut margins, mut wholes) = (vec![], vec![]);
-        for id in (0..needed.len()).filter(|id| needed[*id]) {
+        let mut values = vec![];
+        for id in (0..needed.len()).filter(|id| needed[*id] && timed[*id] == Some(true)) {
             match graph.get(id).0 {
-                Node::Two(Binary::Less | Binary::LessEqual, a, b) if is_timed(&[a, b]) => {
-                    margins.push(graph.two(Binary::Sub, a, b));
-                }
-                Node::One(Unary::Sign, a) if is_timed(&[a]) => margins.push(a),
-                Node::One(Unary::Floor, a) if is_timed(&[a]) => wholes.push(a),
-                Node::Two(Binary::Mod, a, b) if is_timed(&[a, b]) => {
-                    wholes.push(graph.two(Binary::Div, a, b));
+                Node::Two(Binary::Less | Binary::LessEqual, ..)
+                | Node::One(Unary::Sign | Unary::Floor, _) => values.push(id),
+                Node::Two(Binary::Mod, a, b) => {
+                    let share = graph.two(Binary::Div, a, b);
+                    values.push(graph.one(Unary::Floor, share));
                 }
                 _ => {}
             }
         }
-        let all = [&margins[..], &wholes[..]].concat();
-        let needed = graph.needed(&all);
+        let needed = graph.needed(&values);
         let mut needed = (0..needed.len()).filter(|id| needed[*id]);
-        (!all.is_empty()).then(|| Self {
-            values: OperationTape::new(graph, &all),
-            margins: margins.len(),
-            count: all.len(),
+        (!values.is_empty()).then(|| Self {
+            values: OperationTape::new(graph, &values),
+            count: values.len(),
             by_time: needed.any(|id| graph.get(id).0 == Node::Time),
         })
     }
 
-    /// Returns the times of a step at which rates jump, none where there are too many.
-    pub fn times(&self, now: &Now<'_>) -> Vec<f64> {
-        let mut all = vec![];
+    /// Returns the times of a step at which rates jump, none where there are too many; `None` where nothing moves.
+    pub fn times(&self, now: &Now<'_>) -> Option<Vec<f64>> {
         if !self.by_time && now.between.is_none() {
-            return all;
+            return None;
         }
-        let mut first = self.classes(now, 0.0);
+        let (mut all, mut first) = (vec![], self.at(now, 0.0));
         for part in 1..=PARTS {
             let from = (part - 1) as f64 / PARTS as f64;
             let end = part as f64 / PARTS as f64;
-            let last = self.classes(now, end);
+            let last = self.at(now, end);
             for i in 0..self.count {
-                let (mut low, mut class) = (from, first[i]);
-                while class != last[i] && !class.is_nan() && !last[i].is_nan() {
+                let (mut low, mut value) = (from, first[i]);
+                while value != last[i] && !value.is_nan() && !last[i].is_nan() {
                     if all.len() == MOST {
-                        return vec![];
+                        return Some(vec![]);
                     }
                     let mut high = end;
-                    // Until nothing is between.
-                    loop {
+                    while high - low > f64::EPSILON {
                         let middle = 0.5 * (low + high);
-                        if middle <= low || middle >= high {
-                            break;
-                        }
-                        match self.classes(now, middle)[i] == class {
+                        match self.at(now, middle)[i] == value {
                             true => low = middle,
                             false => high = middle,
                         }
                     }
                     all.push(now.t + high * now.dt);
-                    (low, class) = (high, self.classes(now, high)[i]);
+                    (low, value) = (high, self.at(now, high)[i]);
                 }
             }
             first = last;
         }
-        all
+        Some(all)
     }
 
-    /// Sign or whole part of each value at a share of the way.
-    fn classes(&self, now: &Now<'_>, share: f64) -> SmallVec<[f64; 4]> {
-        let mut values: SmallVec<[f64; 4]> = smallvec![0.0; self.count];
+    /// The values at a share of the way.
+    fn at(&self, now: &Now<'_>, share: f64) -> SmallVec<[f64; 4]> {
         let mut inputs = SmallVec::<[f64; 4]>::from_slice(now.u);
         if let Some(between) = now.between {
             between.inputs_at(share, share, now.u, &mut inputs);
@@ -107,14 +91,8 @@ impl Jumps {
             u: &inputs,
             ..*now
         };
+        let mut values: SmallVec<[f64; 4]> = smallvec![0.0; self.count];
         self.values.point(&at, &[], &mut values);
-        for (i, value) in values.iter_mut().enumerate() {
-            *value = match i < self.margins {
-                true if value.is_nan() => f64::NAN,
-                true => f64::from(*value > 0.0),
-                false => value.floor(),
-            };
-        }
         values
     }
 }

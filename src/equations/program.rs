@@ -100,6 +100,23 @@ impl OperationTape {
     }
 }
 
+impl Program {
+    /// Both ends of the limits of each state; empty where no parameter sets one.
+    fn ends(&self, now: &Now<'_>) -> Vec<f64> {
+        let Some(tape) = &self.tapes.ends else {
+            return vec![];
+        };
+        let mut ends = vec![0.0; 2 * self.limits.len()];
+        tape.point(now, &[], &mut ends);
+        ends
+    }
+}
+
+/// Returns the limits between two ends. Ends in the wrong order hold nothing: θ that crosses them is for the prior to exclude.
+fn held([low, high]: [f64; 2]) -> Option<Interval> {
+    Interval::new(low, high).ok()
+}
+
 impl StateSpace for Program {
     fn outline(&self) -> Outline {
         self.outline.clone()
@@ -154,23 +171,24 @@ impl StateSpace for Program {
     }
 
     fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        let Some(tape) = &self.tapes.ends else {
-            return;
-        };
-        let mut ends = vec![0.0; 2 * x.len()];
-        tape.point(now, &[], &mut ends);
-        for (x, ends) in x.iter_mut().zip(ends.as_chunks::<2>().0) {
-            // Ends in the wrong order leave a state alone: θ that crosses them is for the prior to exclude.
-            if ends[0] < ends[1] {
-                *x = Interval::unchecked(ends[0], ends[1]).clamp(*x);
-            } else if ends[0].is_nan() || ends[1].is_nan() {
-                *x = f64::NAN;
+        for (x, ends) in x.iter_mut().zip(self.ends(now).as_chunks::<2>().0) {
+            match held(*ends) {
+                Some(limit) => *x = limit.clamp(*x),
+                None if ends[0].is_nan() || ends[1].is_nan() => *x = f64::NAN,
+                None => {}
             }
         }
     }
 
+    fn limits_at(&self, now: &Now<'_>) -> Option<Vec<Interval>> {
+        let ends = self.ends(now);
+        let limits = ends.as_chunks::<2>().0.iter();
+        let limits = limits.map(|ends| held(*ends).unwrap_or(Interval::EVERYTHING));
+        self.tapes.ends.is_some().then(|| limits.collect())
+    }
+
     fn jumps(&self, now: &Now<'_>) -> Option<Vec<f64>> {
-        Some(self.tapes.jumps.as_ref()?.times(now))
+        self.tapes.jumps.as_ref()?.times(now)
     }
 
     fn integrator(&self) -> Integrator {

@@ -39,6 +39,11 @@ impl Interval {
         Self::new(self.low, self.high)
     }
 
+    /// What is in both; this one where nothing is.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self::new(self.low.max(other.low), self.high.min(other.high)).unwrap_or(self)
+    }
+
     /// Lower end.
     pub fn low(self) -> f64 {
         self.low

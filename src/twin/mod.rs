@@ -39,7 +39,9 @@ pub use composed::{Composed, ComposedBlackBox, DigitalTwin};
 pub(crate) use definitions::rates;
 pub use error::{SimulationError, TwinError};
 pub use handle::Twin;
-pub(crate) use integrator::{Bends, Between, EventCalls, MOST_SUBSTEPS, TOLERANCES, Workspace};
+pub(crate) use integrator::{
+    Bends, Between, EventCalls, MOST_SUBSTEPS, TOLERANCES, TellJumps, Workspace,
+};
 pub use integrator::{Event, Hold, Integrator, Now, Stepping, StepsTaken};
 pub use interval::Interval;
 pub(crate) use names::{check_twin, is_memory};

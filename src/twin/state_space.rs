@@ -80,9 +80,15 @@ pub trait StateSpace: Send + Sync {
     /// Where a level is fitted, one factor multiplies the declared levels: their dependence on states and time stays.
     fn noise(&self, _now: &Now<'_>, _x: &[f64], _process: &mut [f64], _measurement: &mut [f64]) {}
 
-    /// Boxes that the states are held in after each step and substep; unbounded by default.
+    /// Boxes that the states are held in after each step and substep, and within steps that take rates between; unbounded by default.
     fn limits(&self) -> Vec<Interval> {
         vec![Interval::EVERYTHING; self.outline().states.len()]
+    }
+
+    /// Boxes of the states at these parameters, which the way between two samples has beside [`limits`](Self::limits); `None` by default. For the
+    /// samples, [`constrain`](Self::constrain) holds the states.
+    fn limits_at(&self, _now: &Now<'_>) -> Option<Vec<Interval>> {
+        None
     }
 
     /// Constraints that are no boxes (an overflow from one state into another), after noise, before limits.

@@ -98,7 +98,35 @@ fn a_delay_counts_seconds_where_steps_vary() {
     }
 }
 
-/// A step of a parameter within a sample of adaptive steps acts at its time, smoothly: y = t, from then on 1.5 t' more.
+/// A late twin in adaptive steps stands still until the delay is over, and its parameter steps so much later.
+#[test]
+fn a_delay_ends_within_an_adaptive_step() {
+    let text = "[parameters]\nk = { prior = [0.1, 2.0] }\n[states]\nx = { rate = \"-k*x\", start = 1.0 }\n\
+                [outputs]\ny = { value = \"x\", noise = 0.05 }";
+    let base = Twin::from(Arc::new(Equations::parse(text).unwrap()));
+    let effect = |id: &str, target: &str| Catalogue::default().effect(id, target).unwrap();
+    let effects = vec![
+        effect("parameter-step", "k"),
+        effect("sensor-delay", "sensor"),
+    ];
+    let twin = augment_late(base, effects).unwrap();
+    let names = twin.parameters();
+    assert!(names.names()[1].ends_with("size") && names.names()[3].ends_with("delay"));
+    let drive = Drive::autonomous(2.0, 5).unwrap().beginning_at(100.0);
+    for (time, delay) in [(0.7, 0.9), (0.7, 1.9), (3.1, 2.0), (0.3, 3.3)] {
+        let run = twin.free_run(&[0.2, 0.5, time, delay], &drive).unwrap();
+        for (k, y) in run.iter().enumerate() {
+            let t = (2.0 * k as f64 - delay).max(0.0);
+            let expected = (-0.2 * (t + 0.5 * (t - time).max(0.0))).exp();
+            assert!(
+                (y - expected).abs() < 1e-7,
+                "{time}, {delay}, row {k}: {y}, {expected}"
+            );
+        }
+    }
+}
+
+/// A step of a parameter within a sample of adaptive steps acts at its time: y = t, and half of what is behind it more.
 #[test]
 fn a_step_of_a_parameter_acts_at_its_time() {
     let text = "[parameters]\nk = { prior = [0.5, 2.0] }\n[states]\nx = { rate = \"k\", start = 0.0 }\n\

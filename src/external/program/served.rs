@@ -208,6 +208,10 @@ impl StateSpace for ServedEquations {
         self.text.constrain(now, x);
     }
 
+    fn limits_at(&self, now: &Now<'_>) -> Option<Vec<Interval>> {
+        self.text.limits_at(now)
+    }
+
     fn jumps(&self, now: &Now<'_>) -> Option<Vec<f64>> {
         self.text.jumps(now).filter(|_| self.motion.is_none())
     }

@@ -11,7 +11,7 @@ use crate::twin::points::{
 };
 use crate::twin::{
     DigitalTwin, Event, EventCalls, Integrator, Noise, Now, ParameterSpace, SimulationError,
-    StateSpace, Workspace,
+    StateSpace, TellJumps, Workspace,
 };
 use std::sync::Arc;
 
@@ -113,7 +113,8 @@ impl<T: StateSpace> Engine for T {
             };
             let carry = |x: &mut [f64], work: &mut Workspace| {
                 self.update_points(now, Layout::dense(n), x);
-                work.jump_at(|see| see(now, self.jumps(now)));
+                work.jump_at(|tell| tell(now, self.jumps(now)));
+                work.limit_to(|| self.limits_at(now));
                 work.carry(n, now, x, drift);
             };
             let constrain = |x: &mut [f64]| self.constrain_points(now, Layout::dense(n), x);
@@ -139,13 +140,19 @@ impl<T: StateSpace> Engine for T {
         one: (&mut [f64], &mut [f64]),
         work: &mut Workspace,
     ) -> [bool; LANES] {
-        let advance = |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
-        match points.shifts.len() {
-            1 => lanes_one_by_one(1, now, points, one, advance),
-            2 => lanes_one_by_one(2, now, points, one, advance),
-            3 => lanes_one_by_one(3, now, points, one, advance),
-            n => lanes_one_by_one(n, now, points, one, advance),
-        }
+        let tell = |tell: &mut TellJumps<'_>| {
+            now.iter().for_each(|now| tell(now, self.jumps(now)));
+        };
+        work.together(tell, |work| {
+            let advance =
+                |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
+            match points.shifts.len() {
+                1 => lanes_one_by_one(1, now, points, one, advance),
+                2 => lanes_one_by_one(2, now, points, one, advance),
+                3 => lanes_one_by_one(3, now, points, one, advance),
+                n => lanes_one_by_one(n, now, points, one, advance),
+            }
+        })
     }
 
     fn observe_lanes(
@@ -282,7 +289,8 @@ fn carry<T: StateSpace>(
         states: x.len(),
         inside: &|now, _, then| then(now),
     };
-    work.jump_at(|see| see(now, twin.jumps(now)));
+    work.jump_at(|tell| tell(now, twin.jumps(now)));
+    work.limit_to(|| twin.limits_at(now));
     work.carry_with_events(&calls, x.len(), now, x, drift);
 }
 

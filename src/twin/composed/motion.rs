@@ -8,7 +8,7 @@ use crate::twin::points::{
     LanePlaces, Layout, Points, advance_together, constrain_together, gather, lanes_one_by_one,
     observe_lanes, readout_lanes, scatter_moved,
 };
-use crate::twin::{EventCalls, Now, Workspace};
+use crate::twin::{EventCalls, Now, TellJumps, Workspace};
 use smallvec::SmallVec;
 
 impl Composed {
@@ -80,7 +80,7 @@ impl Composed {
                     }
                 }
                 TwinPart::Late(_) => {
-                    if let Some(share) = self.parts.moving(now, added.delays) {
+                    if let Some(share) = self.parts.moving_rates(now, added.delays) {
                         dx.iter_mut().for_each(|dx| *dx *= share);
                     }
                 }
@@ -175,38 +175,8 @@ impl Composed {
         work: &mut Workspace,
     ) {
         let centre = x.get(..n);
-        work.jump_at(|see| self.see_jumps(now, centre, see));
-        self.carry_over_jumps(n, (now, own), x, work);
-    }
-
-    /// Calls `see` with the times of a step at which rates jump, those of the equations and those of laws, each in its clock.
-    fn see_jumps(
-        &self,
-        now: &Now<'_>,
-        x: Option<&[f64]>,
-        see: &mut dyn FnMut(&Now<'_>, Option<Vec<f64>>),
-    ) {
-        self.inside(now, x, |own| see(own, self.own.jumps(own)));
-        for added in &self.parts.list {
-            if let TwinPart::Law(part) = &added.part
-                && let Some(time) = part.time
-            {
-                let late = now.t - self.parts.time(now, added.delays);
-                let at = now.first_time + part.m(now.theta)[time] + late;
-                see(now, Some(vec![at]));
-            }
-        }
-    }
-
-    /// As [`carry`](Self::carry), where the buffers know where rates jump.
-    #[inline(always)]
-    fn carry_over_jumps(
-        &self,
-        n: usize,
-        (now, own): (&Now<'_>, Option<&Now<'_>>),
-        x: &mut [f64],
-        work: &mut Workspace,
-    ) {
+        work.jump_at(|tell| self.tell_jumps(now, centre, tell));
+        work.limit_to(|| self.inside(now, centre, |own| self.own.limits_at(own)));
         // One step of Euler's rule has its rates there alone.
         let own = own.filter(|_| work.is_plain());
         let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| match own {
@@ -281,11 +251,49 @@ impl Composed {
         if self.parts.acts.leave_motion() {
             return self.own.advance_lanes(at.own(), points, one, work);
         }
-        if self.own.is_wide() && !self.parts.acts.by_states && are_together(at.whole()) {
-            return self.advance_joined(at.whole(), points, one, work);
+        let is_one_call =
+            self.own.is_wide() && !self.parts.acts.by_states && are_together(at.whole());
+        let tell = |tell: &mut TellJumps<'_>| {
+            let all = at.whole().iter();
+            all.for_each(|now| self.tell_jumps(now, None, tell));
+        };
+        work.together(tell, |work| {
+            if is_one_call {
+                return self.advance_joined(at.whole(), points, one, work);
+            }
+            let advance = |now: &Now<'_>, points: Points<'_>| self.advance(now, points, work);
+            lanes_one_by_one(points.shifts.len(), at.whole(), points, one, advance)
+        })
+    }
+
+    /// Calls `tell` with the times of a step at which rates jump: those of the equations, those of laws, and the end of a delay.
+    fn tell_jumps(&self, now: &Now<'_>, x: Option<&[f64]>, tell: &mut TellJumps<'_>) {
+        let late = self.parts.late(now.theta, 0);
+        self.inside(now, x, |own| {
+            // A clock that stands until the delay is over shows no other times.
+            let own = Now {
+                t: now.t - late,
+                ..*own
+            };
+            let mut times = self.own.jumps(&own);
+            if let Some(times) = times.as_mut().filter(|_| late > 0.0) {
+                times.retain(|at| *at > now.begun);
+                times.iter_mut().for_each(|at| *at += late);
+            }
+            tell(now, times);
+        });
+        if late > 0.0 {
+            tell(now, Some(vec![now.begun + late]));
         }
-        let advance = |now: &Now<'_>, points: Points<'_>| self.advance(now, points, work);
-        lanes_one_by_one(points.shifts.len(), at.whole(), points, one, advance)
+        for added in &self.parts.list {
+            if let TwinPart::Law(part) = &added.part
+                && let Some(time) = part.time
+            {
+                let late = self.parts.late(now.theta, added.delays);
+                let at = now.first_time + part.m(now.theta)[time] + late;
+                tell(now, Some(vec![at]));
+            }
+        }
     }
 
     /// The same with one call of the equations for all filters, which take the steps of the first.
@@ -309,14 +317,9 @@ impl Composed {
         for (now, x) in now.iter().zip(joined.chunks_exact_mut(each)) {
             self.remember(now, None, x);
         }
-        work.jump_at(|see| {
-            for now in now {
-                self.see_jumps(now, None, see);
-            }
-        });
         if work.is_adaptive() {
             let mut first = joined[..each].to_vec();
-            self.carry_over_jumps(n, (&now[0], None), &mut first, work);
+            self.carry(n, (&now[0], None), &mut first, work);
         }
         work.carry(n, &now[0], &mut joined, |stage, x, dx| {
             self.rates_joined((now, stage), each, x, dx);

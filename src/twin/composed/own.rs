@@ -3,7 +3,9 @@
 use super::engine::{Engine, as_rates};
 use crate::math::{LANES, Lanes};
 use crate::twin::points::{Layout, Points, gather, lanes_one_by_one, scatter};
-use crate::twin::{Blocks, Integrator, Interval, Now, SimulationError, StateSpace, Workspace};
+use crate::twin::{
+    Blocks, Integrator, Interval, Now, SimulationError, StateSpace, TellJumps, Workspace,
+};
 use smallvec::SmallVec;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -107,7 +109,7 @@ impl OwnEquations {
         let n = points.shifts.len();
         points.limit(n);
         let moving = &mut points.all[..points.moving * n];
-        work.jump_at(|see| see(now, self.jumps(now)));
+        work.jump_at(|tell| tell(now, self.jumps(now)));
         work.carry(n, now, moving, |now, x, dx| {
             self.drift_points(now, Layout::dense(n), x, dx);
         });
@@ -127,13 +129,19 @@ impl OwnEquations {
         let n = points.shifts.len();
         if !work.is_plain() {
             let (is_wide, is_joined) = (blocks.is_wide(), blocks.is_joined());
-            if (is_wide || is_joined && !work.is_implicit()) && are_together(now) {
-                self.advance_joined(&**blocks, now, points, work);
-                return [false; LANES];
-            }
-            let advance =
-                |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
-            return lanes_one_by_one(n, now, points, one, advance);
+            let is_one_call = (is_wide || is_joined && !work.is_implicit()) && are_together(now);
+            let tell = |tell: &mut TellJumps<'_>| {
+                now.iter().for_each(|now| tell(now, self.jumps(now)));
+            };
+            return work.together(tell, |work| {
+                if is_one_call {
+                    self.advance_joined(&**blocks, now, points, work);
+                    return [false; LANES];
+                }
+                let advance =
+                    |now: &Now<'_>, points: Points<'_>| self.advance_points(now, points, work);
+                lanes_one_by_one(n, now, points, one, advance)
+            });
         }
         let x = &mut points.all[..points.moving * n];
         limit_lanes(points.limits, x);
@@ -154,7 +162,6 @@ impl OwnEquations {
         let n = points.shifts.len();
         let moving = &mut points.all[..points.moving * n];
         let (each, mut all) = (moving.len(), joined(points.limits, now.len(), moving));
-        work.jump_at(|see| now.iter().for_each(|now| see(now, self.jumps(now))));
         if blocks.is_wide() && work.is_adaptive() {
             let mut first = all[..each].to_vec();
             work.carry(n, &now[0], &mut first, |now, x, dx| {

@@ -341,6 +341,12 @@ impl Parts {
         self.delays[delay].iter().map(|&j| theta[j]).sum()
     }
 
+    /// Returns by how many seconds what is behind the delays from this index on is late.
+    pub fn late(&self, theta: &[f64], delays: usize) -> f64 {
+        let delays = delays.min(self.delays.len())..self.delays.len();
+        delays.map(|delay| self.delay(delay, theta)).sum()
+    }
+
     /// Returns the time on the record's own clock that is seen behind the delays from this index on: never before the start.
     #[inline]
     pub fn time(&self, now: &Now<'_>, delays: usize) -> f64 {
@@ -365,6 +371,16 @@ impl Parts {
         let t = self.law_time(now, delays);
         let theta = &[];
         Now { t, theta, ..*now }
+    }
+
+    /// Returns the share of its rates that what is behind a delay has at a stage of a step; `None` for all of them. Adaptive steps end where the
+    /// delay is over.
+    pub fn moving_rates(&self, now: &Now<'_>, delay: usize) -> Option<f64> {
+        if !self.integrator.is_adaptive() {
+            return self.moving(now, delay);
+        }
+        let t = self.time(now, delay + 1) - now.begun;
+        (t < self.delay(delay, now.theta)).then_some(0.0)
     }
 
     /// Returns the share of a step in which what is behind a delay moves; `None` for all of it.

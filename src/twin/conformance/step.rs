@@ -1,4 +1,4 @@
-//! Check of the step: half of each step taken moves no output by more than its noise.
+//! Check of the step: half of it, or of the mean one where steps are adaptive, moves no output by more than its noise.
 
 use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
@@ -142,8 +142,9 @@ fn finer_steps(twin: &Twin, theta: &[f64], drive: &Drive) -> [Vec<(String, Twin)
     let now = taken.map_or(stepping.substeps, |taken| {
         taken.mean().max(stepping.substeps)
     });
-    let more = [4, 16, 64].into_iter().filter_map(|factor| {
-        let many = (factor * now).min(MOST_SUBSTEPS);
+    let more = [4, 16].map(|factor| (factor * now).min(MOST_SUBSTEPS));
+    let more = more.into_iter().filter(|many| *many > now);
+    let more = more.filter_map(|many| {
         let finer = twin.stepped(|_, stepping| stepping.substeps = many)?;
         Some((format!("{many} substeps"), finer))
     });

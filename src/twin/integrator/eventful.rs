@@ -81,8 +81,11 @@ impl Workspace {
         let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
         let of_centre = Some((&events, watches[0].clone()));
         let stretches = match &mut self.schedule {
-            Some(schedule) => schedule.chosen(&mut path, &mut x[..n].to_vec(), &of_centre),
-            None => path.equal(refined.substeps),
+            Some(schedule) => {
+                let way = (&mut path, x.len() > n);
+                schedule.chosen(way, &mut x[..n].to_vec(), &of_centre)
+            }
+            None => path.equal(refined.substeps.max(1)),
         };
         if stretches.is_empty() {
             return x.fill(f64::NAN);

@@ -240,7 +240,14 @@ pub(crate) struct Workspace {
     /// Substeps to a tolerance, beside `refined`.
     schedule: Option<SubstepSchedule>,
     events: EventMemory,
+    /// Limits of every way, by state.
+    limits: Vec<Interval>,
+    /// `true` while filters that go one after the other have told where rates jump.
+    is_together: bool,
 }
+
+/// Takes the times at which rates jump on a way, `None` for rates that jump at no time of their own.
+pub(crate) type TellJumps<'t> = dyn FnMut(&Now<'_>, Option<Vec<f64>>) + 't;
 
 /// Buffers of a step.
 #[derive(Debug, Clone)]
@@ -250,8 +257,9 @@ pub(super) struct StepBuffers {
 }
 
 /// Rule by which a twin moves between samples.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Refined {
+    /// Number of fixed steps, 0 for one.
     substeps: usize,
     /// Limits that are felt, by state.
     limits: Vec<(usize, Interval)>,
@@ -289,6 +297,8 @@ impl Workspace {
             }),
             schedule,
             events: EventMemory::default(),
+            limits: limits.to_vec(),
+            is_together: false,
         }
     }
 
@@ -322,13 +332,11 @@ impl Workspace {
         self.schedule.as_ref().map(SubstepSchedule::taken)
     }
 
-    /// Hears where rates jump on the next way, of all points that go it together: `tell` is called with what takes the times of each. Steps to
-    /// a tolerance end there.
-    pub(super) fn jump_at(
-        &mut self,
-        tell: impl FnOnce(&mut dyn FnMut(&Now<'_>, Option<Vec<f64>>)),
-    ) {
-        let (Some(_), Some(refined)) = (&self.schedule, &mut self.refined) else {
+    /// Hears where rates jump on the next way: `tell` is called with what takes the times of each filter that goes it. Steps to a tolerance end
+    /// there.
+    pub(super) fn jump_at(&mut self, tell: impl FnOnce(&mut TellJumps<'_>)) {
+        let (Some(_), Some(refined), false) = (&self.schedule, &mut self.refined, self.is_together)
+        else {
             return;
         };
         refined.jumps = None;
@@ -338,6 +346,34 @@ impl Workspace {
                 refined.jumps.get_or_insert_default().extend(shares);
             }
         });
+    }
+
+    /// Carries filters one after the other, whose steps all end where the rates of any jump: they take the same ones.
+    pub(super) fn together<R>(
+        &mut self,
+        tell: impl FnOnce(&mut TellJumps<'_>),
+        carry: impl FnOnce(&mut Self) -> R,
+    ) -> R {
+        self.jump_at(tell);
+        self.is_together = true;
+        let carried = carry(self);
+        self.is_together = false;
+        carried
+    }
+
+    /// Hears the limits of states on the next way, beside those of every way.
+    pub(super) fn limit_to(&mut self, told: impl FnOnce() -> Option<Vec<Interval>>) {
+        if self.refined.is_none() && !self.integrator.is_between() {
+            return;
+        }
+        let Some(told) = told() else {
+            return;
+        };
+        let mut limits = self.limits.clone();
+        for (limit, told) in limits.iter_mut().zip(told) {
+            *limit = limit.and(told);
+        }
+        self.refined.get_or_insert_default().limits = felt(&limits);
     }
 
     /// Buffers of a single step.
@@ -423,6 +459,11 @@ fn grown(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
 }
 
 impl Integrator {
+    /// Returns whether steps are as long as a tolerance allows.
+    pub(super) fn is_adaptive(self) -> bool {
+        matches!(self, Self::Adaptive | Self::Stiff)
+    }
+
     /// Returns whether it takes rates where limits have not acted yet.
     fn is_between(self) -> bool {
         !matches!(self, Self::Euler | Self::Discrete)
@@ -450,7 +491,7 @@ impl Integrator {
         (work, refined): (&mut StepBuffers, &mut Refined),
         drift: &mut Rates<'_>,
     ) {
-        let m = refined.substeps;
+        let m = refined.substeps.max(1);
         let h = now.dt / m as f64;
         let mut limits =
             LimitsOfWay::of(n, &refined.limits, &mut refined.within).filter(|_| self.is_between());

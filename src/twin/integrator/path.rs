@@ -6,6 +6,8 @@ use smallvec::SmallVec;
 
 /// Least share of the way by which rates stay off jumps: no tolerance shows it. A tenth would do.
 const CLOSE: f64 = 1e-12;
+/// Largest such share, on clocks that tell a step in few digits: beyond it, the errors of steps locate jumps.
+const FAR: f64 = 1e-6;
 
 /// A stretch of the way, in shares of it.
 #[derive(Debug, Clone, Copy)]
@@ -26,7 +28,7 @@ pub(super) struct Path<'p, 'n> {
     pub drift: &'p mut Rates<'p>,
     /// Shares of the way that no step goes over, in order.
     pub breaks: &'p [f64],
-    /// Share of the way by which rates are taken inside a stretch at its ends: at the time of a jump itself they are those of one side.
+    /// Share of the way by which rates stay off its breaks and ends: at the time of a jump itself they are those of one side.
     pub edge: f64,
     /// Limits of the states on the way; `None` where they act at the ends of steps alone.
     pub limits: Option<LimitsOfWay<'p>>,
@@ -93,8 +95,8 @@ impl Path<'_, '_> {
 
     /// Rates at a part of a stretch.
     pub fn rates(&mut self, of: Stretch, part: f64, x: &[f64], dx: &mut [f64]) {
-        let inside = self.edge.min(0.25 * of.length);
-        let at = of.from + (part * of.length).clamp(inside, of.length - inside);
+        let [after, before] = self.edges(of);
+        let at = of.from + (part * of.length).clamp(after, of.length - before);
         let mut stage = Now {
             t: self.time(at),
             dt: of.length * self.now.dt,
@@ -109,6 +111,21 @@ impl Path<'_, '_> {
             Some(limits) => limits.rates(self.drift, &stage, x, dx),
             None => (self.drift)(&stage, x, dx),
         }
+    }
+
+    /// Shares of the way by which rates stay off both ends of a stretch.
+    pub fn edges(&self, of: Stretch) -> [f64; 2] {
+        if self.edge == 0.0 {
+            return [0.0; 2];
+        }
+        let ends = [of.from, of.from + of.length];
+        ends.map(|end| {
+            let mut breaks = [0.0, 1.0].iter().chain(self.breaks);
+            match breaks.any(|at| (at - end).abs() < 8.0 * f64::EPSILON) {
+                true => self.edge.min(0.25 * of.length),
+                false => 0.0,
+            }
+        })
     }
 
     /// Puts points into the limits.
@@ -131,12 +148,16 @@ impl Path<'_, '_> {
         }
     }
 
-    /// Sign of a change of state j, at `x` with this rate, that shows derivatives: on the side that the state moves to.
-    pub fn side(&self, j: usize, x: f64, rate: f64) -> f64 {
+    /// Sign of a change of state j by `step`, at `x` with this rate, that shows derivatives: within the limits, but for what is held at one.
+    pub fn side(&self, j: usize, (x, step): (f64, f64), rate: f64) -> f64 {
         let limits = self.limits.iter().flat_map(|limits| limits.felt);
         for (_, limit) in limits.filter(|(of, _)| *of == j) {
-            let is_free = rate != 0.0;
-            if x >= limit.high() && is_free || x <= limit.low() && !is_free {
+            let is_held = rate == 0.0 && (x >= limit.high() || x <= limit.low());
+            let is_turned = match is_held {
+                true => x <= limit.low(),
+                false => x + step > limit.high(),
+            };
+            if is_turned {
                 return -1.0;
             }
         }
@@ -206,14 +227,14 @@ pub(super) fn breaks(
     let jumps = jumps.unwrap_or_default().iter().copied();
     all.extend(jumps.filter(|share| *share > edge && *share < 1.0 - edge));
     all.sort_unstable_by(f64::total_cmp);
-    all.dedup();
+    all.dedup_by(|a, b| *a - *b <= edge);
     all
 }
 
 /// Share of the way that rounding leaves of the time of a jump; 0 where rates do not jump at times.
 pub(super) fn edge(now: &Now<'_>, jumps: Option<&[f64]>) -> f64 {
     match jumps {
-        Some(_) => CLOSE + 8.0 * f64::EPSILON * now.t.abs() / now.dt,
+        Some(_) => (CLOSE + 8.0 * f64::EPSILON * now.t.abs() / now.dt).min(FAR),
         None => 0.0,
     }
 }

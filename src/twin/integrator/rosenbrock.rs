@@ -83,7 +83,9 @@ impl Rosenbrock {
         path.rates(of, 0.0, x, &mut self.rates[0]);
         let solvers = self.solvers(path, of, (sizes, x));
         let [first, by_time, now] = &mut self.rates;
-        path.rates(of, OF_STEP, x, by_time);
+        // Rates at the begin may be those behind a jump.
+        let [after, _] = path.edges(of);
+        path.rates(of, after / of.length + OF_STEP, x, by_time);
         for (by_time, first) in by_time.iter_mut().zip(&*first) {
             *by_time = (*by_time - first) / (OF_STEP * h);
         }
@@ -131,8 +133,8 @@ impl Rosenbrock {
             for (p, stage) in self.stage.chunks_exact_mut(n).enumerate() {
                 let rate = first[p * n + j];
                 let size = x[p * n + j].abs().max(sizes[j]).max((h * rate).abs());
-                let side = path.side(j, x[p * n + j], rate);
-                stage[j] += side * HALF_DIGITS * size.max(f64::MIN_POSITIVE.sqrt());
+                let step = HALF_DIGITS * size.max(f64::MIN_POSITIVE.sqrt());
+                stage[j] += path.side(j, (x[p * n + j], step), rate) * step;
             }
             path.rates(of, 0.0, &self.stage, now);
             for (p, matrix) in matrices.iter_mut().enumerate() {

@@ -216,7 +216,8 @@ impl SubstepSchedule {
         let way = (path.now.t, path.now.dt);
         if self.of != Some(way) {
             self.of = Some(way);
-            return self.choose(path, x, &None);
+            let is_followed = x.len() > self.sizes.len();
+            return self.choose((path, is_followed), x, &None);
         }
         if self.stretches.is_empty() {
             // The first ones gave up.
@@ -228,15 +229,15 @@ impl SubstepSchedule {
         }
     }
 
-    /// Returns steps chosen for one point, which moves with them, at whose ends its events are.
+    /// Returns steps chosen for one point, which moves with them, at whose ends its events are; others may follow.
     pub fn chosen(
         &mut self,
-        path: &mut Path<'_, '_>,
+        (path, is_followed): (&mut Path<'_, '_>, bool),
         x: &mut [f64],
         events: &WayEvents<'_>,
     ) -> Vec<Stretch> {
         self.of = None;
-        self.choose(path, x, events);
+        self.choose((path, is_followed), x, events);
         self.stretches.clone()
     }
 
@@ -256,7 +257,13 @@ impl SubstepSchedule {
     }
 
     /// Chooses the method and the substeps of this way, and takes them.
-    fn choose(&mut self, path: &mut Path<'_, '_>, x: &mut [f64], events: &WayEvents<'_>) {
+    fn choose(
+        &mut self,
+        (path, is_followed): (&mut Path<'_, '_>, bool),
+        x: &mut [f64],
+        events: &WayEvents<'_>,
+    ) {
+        let patience = if is_followed { FEW } else { FEW * MANY };
         let mut buffers = std::mem::take(&mut self.buffers);
         buffers.begin(x, &self.sizes);
         let was_rough = std::mem::take(&mut self.is_even);
@@ -267,18 +274,18 @@ impl SubstepSchedule {
         };
         let mut outcome = match begins_rough {
             true => SampleSteps::Rough,
-            false => self.tried(path, x, events, (most, &mut buffers)),
+            false => self.tried(path, x, events, (most, patience, &mut buffers)),
         };
         if let SampleSteps::Many { covered } = outcome {
             let explicit = MANY as f64 / covered.max(SHORTEST);
             let most = (explicit / WORTH).min(MOST_SUBSTEPS as f64) as usize;
             buffers.undo(x, &mut self.sizes);
             self.is_implicit = true;
-            outcome = self.tried(path, x, events, (most, &mut buffers));
+            outcome = self.tried(path, x, events, (most, patience, &mut buffers));
             if !matches!(outcome, SampleSteps::Done) {
                 self.is_implicit = false;
                 buffers.undo(x, &mut self.sizes);
-                outcome = self.tried(path, x, events, (usize::MAX, &mut buffers));
+                outcome = self.tried(path, x, events, (usize::MAX, patience, &mut buffers));
             }
         }
         if matches!(outcome, SampleSteps::Rough) {
@@ -298,9 +305,9 @@ impl SubstepSchedule {
         path: &mut Path<'_, '_>,
         x: &mut [f64],
         events: &WayEvents<'_>,
-        (most, buffers): (usize, &mut ScheduleBuffers),
+        (most, patience, buffers): (usize, usize, &mut ScheduleBuffers),
     ) -> SampleSteps {
-        let (n, dt) = (self.sizes.len(), path.now.dt);
+        let dt = path.now.dt;
         let mut events = events.clone();
         let order = match self.is_implicit {
             true => rosenbrock::ORDER,
@@ -309,17 +316,14 @@ impl SubstepSchedule {
         let ScheduleBuffers { trial, errors, .. } = buffers;
         let (mut next, mut from, mut steps, mut shortest) = (self.next, 0.0, 0, SHORTEST);
         let mut falls = Falls::default();
-        let patience = if x.len() > n { FEW } else { FEW * MANY };
         self.stretches.clear();
         while from < 1.0 {
             if steps >= patience && falls.repeat() {
                 return SampleSteps::Rough;
             }
-            if steps > 0 && steps % patience == 0 {
-                let lengths = JUMPS.map(|factor| (factor * next / dt).min(1.0 - from));
-                if self.jumps(path, x, from, lengths) {
-                    return SampleSteps::Rough;
-                }
+            let lengths = JUMPS.map(|factor| factor * next / dt);
+            if steps > 0 && steps % patience == 0 && self.jumps(path, x, from, lengths) {
+                return SampleSteps::Rough;
             }
             // Explicit steps that are short for another reason than stiffness go on.
             if steps >= most && (self.is_implicit || falls.are_stiff()) {
@@ -349,9 +353,9 @@ impl SubstepSchedule {
                 false => CHANGE.0,
             };
             // A step that a jump cuts short says little of the next.
-            let is_cut = path.edge > 0.0 && parts == 1.0 && size <= 1.0;
-            let shortened = if is_cut { next } else { 0.0 };
-            next = shortened.max(factor * of.length * dt);
+            let is_cut = path.edge > 0.0 && of.length < longest && size <= 1.0;
+            let before = if is_cut { next } else { 0.0 };
+            next = before.max(factor * of.length * dt);
             // A thousand steps with a thousandth of a state's size each are no way. At a jump of rates, a shortest step may have any error.
             let is_forced = shortest > SHORTEST && longest <= shortest;
             if is_forced && size.is_finite() && size > 1e-3 / self.tolerance {
@@ -380,6 +384,9 @@ impl SubstepSchedule {
     /// Returns whether rates jump in steps of these lengths, beyond the tolerance: errors then grow in proportion to the length. Those of smooth rates
     /// grow with its fifth power, those of stiff rates faster.
     fn jumps(&mut self, path: &mut Path<'_, '_>, x: &[f64], from: f64, lengths: [f64; 2]) -> bool {
+        // A jump that is told is none.
+        let end = path.next_break(from) - from;
+        let lengths = lengths.map(|length| length.min(end));
         let errors = lengths.map(|length| {
             let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
             let of = Stretch { from, length };

@@ -2,7 +2,8 @@ use super::pair::ExplicitPair;
 use super::path::Stretch;
 use super::rosenbrock::Rosenbrock;
 use super::*;
-use crate::record::Drive;
+use crate::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
+use crate::record::{Drive, Record};
 use crate::twin::{DigitalTwin, Event, Interval, Noise, Outline, Parameter, StateSpace, Twin};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -130,6 +131,12 @@ fn a_step_ends_at_a_jump_that_is_told() {
         fn jumps(&self, now: &Now<'_>) -> Option<Vec<f64>> {
             Some(vec![now.theta[0]])
         }
+        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+            x[0] = 0.0;
+        }
+        fn noise(&self, _: &Now<'_>, _: &[f64], _: &mut [f64], measurement: &mut [f64]) {
+            measurement[0] = 0.1;
+        }
         fn integrator(&self) -> Integrator {
             Integrator::Adaptive
         }
@@ -141,6 +148,27 @@ fn a_step_ends_at_a_jump_that_is_told() {
         }
     }
     let drive = Drive::autonomous(2.0, 4).unwrap();
+    let outputs = Twin::new(Switch).free_run(&[2.7], &drive).unwrap();
+    let record = Record::new(drive.clone(), outputs.clone()).unwrap();
+    let (twin, settings) = (Twin::new(Switch), FilterSettings::default());
+    let kalman = Kalman::new(twin.equations().unwrap(), &record, &settings).unwrap();
+    for at in [2.2_f64, 2.5, 2.9] {
+        // Filters side by side, each with its own time; coordinates are logarithms.
+        let coordinates = Coordinates::new(&twin.parameters());
+        let score = Score::forward(&kalman, &[at], &coordinates).unwrap();
+        let residual = |(k, y): (usize, &f64)| {
+            let t = 2.0 * k as f64;
+            let late = t > at;
+            let of = y - 0.5 * (t * t - at * at).max(0.0);
+            -of * f64::from(late) * at / 0.1_f64.powi(2)
+        };
+        let expected: f64 = outputs.iter().enumerate().map(residual).sum();
+        let slope = score.gradient[0] / at;
+        assert!(
+            (slope / expected - 1.0).abs() < 1e-2,
+            "{at}: {slope}, {expected}"
+        );
+    }
     let twins = [
         Twin::new(Switch),
         Twin::from(Arc::new(Switch) as Arc<dyn DigitalTwin>),
