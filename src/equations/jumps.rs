@@ -10,8 +10,6 @@ use smallvec::{SmallVec, smallvec};
 /// Parts of a way at whose ends conditions are compared: of two changes in one part none is seen. Half misses a pulse that lasts a fifth of the
 /// way, twice as many cost twice.
 const PARTS: usize = 8;
-/// Most jumps of a way: of more, steps of one length do. Half would do, too.
-const MOST: usize = 32;
 
 /// Values that are the same but where rates jump.
 #[derive(Debug)]
@@ -60,7 +58,8 @@ impl Jumps {
             for i in 0..self.count {
                 let (mut low, mut value) = (from, first[i]);
                 while value != last[i] && !value.is_nan() && !last[i].is_nan() {
-                    if all.len() == MOST {
+                    // Of more, steps of one length do.
+                    if all.len() == 4 * PARTS {
                         return Some(vec![]);
                     }
                     let mut high = end;

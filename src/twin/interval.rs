@@ -39,7 +39,7 @@ impl Interval {
         Self::new(self.low, self.high)
     }
 
-    /// What is in both; this one where nothing is.
+    /// The part of it in another; all of it where they have none in common.
     pub(crate) fn and(self, other: Self) -> Self {
         Self::new(self.low.max(other.low), self.high.min(other.high)).unwrap_or(self)
     }

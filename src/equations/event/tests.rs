@@ -172,6 +172,31 @@ fn events_in_discrete_time_act_at_rows() {
     );
 }
 
+/// A tank that is emptied when it is full, its limit: at its time, also where it begins there, whether full is at the limit or beyond.
+#[test]
+fn a_state_that_is_held_at_its_limit_has_its_event() {
+    let drive = Drive::autonomous(0.7, 12).unwrap();
+    for rule in ["adaptive", "stiff", "runge-kutta-4"] {
+        for (full, start) in [(">=", 0.45), (">", 0.45), (">=", 2.0), (">", 2.0)] {
+            let text = format!(
+                "[parameters]\na = {{ prior = [0.1, 2.0] }}\n\
+                 [states]\nh = {{ rate = \"a\", start = {start:.2}, limits = [0, 2] }}\n\
+                 [outputs]\ny = {{ value = \"h\", noise = 0.05 }}\n[[event]]\nwhen = \"h {full} 2\"\nset = {{ h = 0 }}\n"
+            );
+            let y = under(rule, &text)
+                .simulate(&[1.0], &drive, Noise::OFF)
+                .unwrap();
+            for (row, y) in y.iter().enumerate().skip(1) {
+                let exact = (start + 0.7 * row as f64) % 2.0;
+                assert!(
+                    (y - exact).abs() < 1e-6,
+                    "{rule}, h {full} 2 from {start}, row {row}: {y} {exact}"
+                );
+            }
+        }
+    }
+}
+
 /// A condition that is true at the start is no event; one that a change turns true is.
 #[test]
 fn events_lead_to_others_and_do_not_begin() {

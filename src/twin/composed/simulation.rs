@@ -380,7 +380,7 @@ fn ended(work: &Workspace, at: f64) -> SimulationError {
 
 /// Holds outputs back by their dead times; before the start, the first values stand.
 pub(crate) struct DeadTime {
-    /// Of each output; empty where none is late.
+    /// Dead time of each output; empty where none is late.
     late: Vec<Late>,
     /// Times and outputs so far, as observed.
     times: Vec<f64>,

@@ -75,8 +75,12 @@ impl Workspace {
             drift,
             breaks: &breaks,
             edge: edge(&way, jumps),
-            limits: LimitsOfWay::of(n, &refined.limits, &mut refined.within)
-                .filter(|_| rule.is_between()),
+            limits: LimitsOfWay::of(
+                n,
+                &refined.limits,
+                (&mut refined.within, &mut refined.beyond),
+            )
+            .filter(|_| rule.is_between()),
         };
         let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
         let of_centre = Some((&events, watches[0].clone()));

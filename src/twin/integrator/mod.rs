@@ -13,7 +13,7 @@ mod watch;
 
 use crate::twin::Interval;
 use eventful::EventMemory;
-use path::{LimitsOfWay, Path, Rates, Stretch, breaks, edge, limited};
+use path::{Beyond, LimitsOfWay, Path, Rates, Stretch, breaks, edge, limited};
 use schedule::SubstepSchedule;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
@@ -265,8 +265,9 @@ struct Refined {
     limits: Vec<(usize, Interval)>,
     /// Inputs at a stage.
     inputs: Vec<f64>,
-    /// Points at a stage, within their limits.
+    /// Points at a stage, within their limits, and how far they were beyond these.
     within: Vec<f64>,
+    beyond: Vec<[Beyond; 2]>,
     /// Shares of the way at which rates jump; `None` for rates that jump at no time of their own.
     jumps: Option<Vec<f64>>,
 }
@@ -293,6 +294,7 @@ impl Workspace {
                 limits: felt(limits),
                 inputs: vec![0.0; holds.len()],
                 within: vec![],
+                beyond: vec![],
                 jumps: None,
             }),
             schedule,
@@ -414,7 +416,11 @@ impl Workspace {
                     drift,
                     breaks: &breaks(now, jumps, []),
                     edge: edge(now, jumps),
-                    limits: LimitsOfWay::of(n, &refined.limits, &mut refined.within),
+                    limits: LimitsOfWay::of(
+                        n,
+                        &refined.limits,
+                        (&mut refined.within, &mut refined.beyond),
+                    ),
                 };
                 schedule.carry(&mut path, x);
             }
@@ -493,8 +499,12 @@ impl Integrator {
     ) {
         let m = refined.substeps.max(1);
         let h = now.dt / m as f64;
-        let mut limits =
-            LimitsOfWay::of(n, &refined.limits, &mut refined.within).filter(|_| self.is_between());
+        let mut limits = LimitsOfWay::of(
+            n,
+            &refined.limits,
+            (&mut refined.within, &mut refined.beyond),
+        )
+        .filter(|_| self.is_between());
         let mut drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| match &mut limits {
             Some(limits) => limits.rates(drift, now, x, dx),
             None => drift(now, x, dx),

@@ -69,6 +69,7 @@ impl ExplicitPair {
     ) {
         let (h, size) = (path.seconds(of), x.len());
         self.stage.resize(size, 0.0);
+        path.begin_step();
         // The slope at the end serves the errors alone.
         let stages = if errors.is_some() { 7 } else { 6 };
         for i in 0..stages {

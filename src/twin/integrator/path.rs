@@ -6,8 +6,6 @@ use smallvec::SmallVec;
 
 /// Least share of the way by which rates stay off jumps: no tolerance shows it. A tenth would do.
 const CLOSE: f64 = 1e-12;
-/// Largest such share, on clocks that tell a step in few digits: beyond it, the errors of steps locate jumps.
-const FAR: f64 = 1e-6;
 
 /// A stretch of the way, in shares of it.
 #[derive(Debug, Clone, Copy)]
@@ -34,14 +32,47 @@ pub(super) struct Path<'p, 'n> {
     pub limits: Option<LimitsOfWay<'p>>,
 }
 
-/// Limits that hold anywhere on a way.
+/// Limits that hold anywhere on a way: what follows a state beyond one sees it there. The state itself goes on until the step's end, so that an
+/// event at the limit is met, and is then put into it.
 pub(super) struct LimitsOfWay<'p> {
     /// Number of states of a point.
     states: usize,
     /// Limits that are felt, by state.
     felt: &'p [(usize, Interval)],
-    /// Buffer: points within their limits.
+    /// Buffers: points within their limits, and stages beyond each end so far.
     within: &'p mut Vec<f64>,
+    beyond: &'p mut Vec<[Beyond; 2]>,
+}
+
+/// Stages of a step beside an end of a limit.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Beyond {
+    /// How far a stage was beyond it, at most.
+    far: f64,
+    /// Rate on where the step began, if at the limit, and at its last stage.
+    first: f64,
+    last: f64,
+}
+
+impl Beyond {
+    fn see(&mut self, is_first: bool, far: f64, rate: f64) {
+        self.far = self.far.max(far);
+        self.last = rate;
+        if is_first && far >= 0.0 {
+            self.first = rate;
+        }
+    }
+
+    /// Returns by how much the state is off when a step of `h` seconds ends so far beyond: it went on where it should have been held, and came back
+    /// from there, not from the limit. Between stages, rates lie on a line.
+    fn late(&self, end: f64, h: f64) -> f64 {
+        let (on, back) = (self.first, -self.last);
+        let turned = match on > 0.0 && back > 0.0 {
+            true => 0.5 * h * on.min(back) * (on.min(back) / (on + back)),
+            false => 0.0,
+        };
+        turned.max(self.far - end.max(0.0))
+    }
 }
 
 impl<'p> LimitsOfWay<'p> {
@@ -49,29 +80,51 @@ impl<'p> LimitsOfWay<'p> {
     pub fn of(
         states: usize,
         felt: &'p [(usize, Interval)],
-        within: &'p mut Vec<f64>,
+        (within, beyond): (&'p mut Vec<f64>, &'p mut Vec<[Beyond; 2]>),
     ) -> Option<Self> {
         let limits = Self {
             states,
             felt,
             within,
+            beyond,
         };
         (!felt.is_empty()).then_some(limits)
     }
 
-    /// Calls equations with points within their limits; a rate that leads out of a limit is zero.
+    /// Calls equations with points within their limits.
     pub fn rates(&mut self, drift: &mut Rates<'_>, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
         self.within.clear();
         self.within.extend_from_slice(x);
         limited(self.states, self.within, self.felt);
         drift(now, self.within, dx);
-        for &(j, limit) in self.felt {
-            let points = self.within.iter().zip(&mut *dx);
-            for (x, dx) in points.skip(j).step_by(self.states) {
-                // What is no number stays so.
-                if *x >= limit.high() && *dx > 0.0 || *x <= limit.low() && *dx < 0.0 {
-                    *dx = 0.0;
-                }
+        self.see(x, dx);
+    }
+
+    /// Sees a stage with its rates.
+    fn see(&mut self, x: &[f64], dx: &[f64]) {
+        let (points, is_first) = (x.len() / self.states, self.beyond.is_empty());
+        self.beyond
+            .resize(points * self.felt.len(), Default::default());
+        for (&(j, limit), beyond) in self.felt.iter().zip(self.beyond.chunks_exact_mut(points)) {
+            let of = x.iter().zip(dx).skip(j).step_by(self.states);
+            for ((x, dx), [below, above]) in of.zip(beyond) {
+                below.see(is_first, limit.low() - x, -dx);
+                above.see(is_first, x - limit.high(), *dx);
+            }
+        }
+    }
+
+    /// Sets errors of points at `x` to those that are left within the limits: what is beyond one for both orders has none. A state that was beyond
+    /// one and turned back left it late by as much.
+    fn errors(&self, h: f64, x: &[f64], errors: &mut [f64]) {
+        let points = x.len() / self.states;
+        for (&(j, limit), beyond) in self.felt.iter().zip(self.beyond.chunks_exact(points)) {
+            let of = x.iter().zip(&mut *errors).skip(j).step_by(self.states);
+            for ((x, error), [below, above]) in of.zip(beyond) {
+                let other = *x - *error;
+                let late = below.late(limit.low() - x, h);
+                let late = late.max(above.late(x - limit.high(), h));
+                *error = (limit.clamp(*x) - limit.clamp(other)).abs() + late;
             }
         }
     }
@@ -135,27 +188,38 @@ impl Path<'_, '_> {
         }
     }
 
-    /// Sets errors of points to those that are left within the limits: what is beyond one for both orders has no error.
-    pub fn limit_errors(&self, x: &[f64], errors: &mut [f64]) {
-        let Some(limits) = &self.limits else {
-            return;
-        };
-        for &(j, limit) in limits.felt {
-            let points = x.iter().zip(&mut *errors);
-            for (x, error) in points.skip(j).step_by(limits.states) {
-                *error = limit.clamp(*x) - limit.clamp(*x - *error);
-            }
+    /// Sets errors of points at the end of a step to those that are left within the limits.
+    pub fn limit_errors(&self, of: Stretch, x: &[f64], errors: &mut [f64]) {
+        if let Some(limits) = &self.limits {
+            limits.errors(self.seconds(of), x, errors);
         }
     }
 
-    /// Sign of a change of state j by `step`, at `x` with this rate, that shows derivatives: within the limits, but for what is held at one.
+    /// Begins a step, of which no stage has been.
+    pub fn begin_step(&mut self) {
+        if let Some(limits) = &mut self.limits {
+            limits.beyond.clear();
+        }
+    }
+
+    /// Begins a step whose first stage has been, with its rates.
+    pub fn begin_step_at(&mut self, x: &[f64], rates: &[f64]) {
+        self.begin_step();
+        if let Some(limits) = &mut self.limits {
+            limits.see(x, rates);
+        }
+    }
+
+    /// Sign of a change of state j by `step`, at `x` with this rate, that shows derivatives: to the side that the state moves to where it is at a
+    /// limit, and within the limits elsewhere.
     pub fn side(&self, j: usize, (x, step): (f64, f64), rate: f64) -> f64 {
         let limits = self.limits.iter().flat_map(|limits| limits.felt);
         for (_, limit) in limits.filter(|(of, _)| *of == j) {
-            let is_held = rate == 0.0 && (x >= limit.high() || x <= limit.low());
-            let is_turned = match is_held {
-                true => x <= limit.low(),
-                false => x + step > limit.high(),
+            let is_at_end = x >= limit.high() || x <= limit.low();
+            let is_turned = if is_at_end {
+                rate < 0.0
+            } else {
+                x + step > limit.high()
             };
             if is_turned {
                 return -1.0;
@@ -231,10 +295,11 @@ pub(super) fn breaks(
     all
 }
 
-/// Share of the way that rounding leaves of the time of a jump; 0 where rates do not jump at times.
+/// Share of the way that rounding leaves of the time of a jump; 0 where rates do not jump at times. On clocks that tell a step in few digits it
+/// is more than is taken, and errors of steps locate jumps.
 pub(super) fn edge(now: &Now<'_>, jumps: Option<&[f64]>) -> f64 {
     match jumps {
-        Some(_) => (CLOSE + 8.0 * f64::EPSILON * now.t.abs() / now.dt).min(FAR),
+        Some(_) => (CLOSE + 8.0 * f64::EPSILON * now.t.abs() / now.dt).min(CLOSE.sqrt()),
         None => 0.0,
     }
 }

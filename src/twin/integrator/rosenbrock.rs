@@ -86,6 +86,7 @@ impl Rosenbrock {
         // Rates at the begin may be those behind a jump.
         let [after, _] = path.edges(of);
         path.rates(of, after / of.length + OF_STEP, x, by_time);
+        path.begin_step_at(x, first);
         for (by_time, first) in by_time.iter_mut().zip(&*first) {
             *by_time = (*by_time - first) / (OF_STEP * h);
         }

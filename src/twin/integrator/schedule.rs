@@ -345,7 +345,7 @@ impl SubstepSchedule {
             };
             trial.copy_from_slice(x);
             self.step(path, of, trial, Some(errors));
-            path.limit_errors(trial, errors);
+            path.limit_errors(of, trial, errors);
             let size = self.largest((x, trial), errors);
             falls.see(size <= 1.0, self.explicit.reach());
             let factor = match size.is_finite() {
@@ -391,7 +391,7 @@ impl SubstepSchedule {
             let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
             let of = Stretch { from, length };
             self.explicit.step(path, of, &mut trial, Some(&mut errors));
-            path.limit_errors(&trial, &mut errors);
+            path.limit_errors(of, &trial, &mut errors);
             self.largest((x, &trial), &errors)
         });
         let order = (errors[1] / errors[0]).ln() / (lengths[1] / lengths[0]).ln();
