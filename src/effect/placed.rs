@@ -57,10 +57,13 @@ impl Effect {
                 None if own == Some(key) => (
                     "id",
                     format!(
-                        "acts between two states; add {key} = \"…\", the name of the other one{}",
-                        match key {
-                            "to" => ", or of the only one",
-                            _ => "",
+                        "acts between two states; add {key} = \"…\", the name of {}",
+                        match kind.other_state() {
+                            Some(OtherState::To) => "the other one, or of the only one",
+                            Some(OtherState::RateOfOrItself) =>
+                                "the one whose rate the target is, or else of the target itself",
+                            Some(OtherState::RateOf) => "the one whose rate the target is",
+                            Some(OtherState::From) | None => "the other one",
                         }
                     ),
                 ),

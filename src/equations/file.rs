@@ -164,8 +164,11 @@ fn read(source: SourceText<'_>, file: &DeTable<'_>) -> Result<Equations, Equatio
     let (integrator, stepping) = integrator(source, file, reader.motion == Some("next"))?;
     let name = name(source, file)?;
     let is_discrete = integrator == Integrator::Discrete;
-    let rates: Vec<Id> = states.iter().map(|state| state.motion).collect();
-    let jumps = Jumps::of(&mut reader.names.graph, &rates).filter(|_| !is_discrete);
+    let rates = states.iter().map(|state| state.motion);
+    let jumping: Vec<Id> = rates
+        .chain(events.iter().filter_map(EventText::condition))
+        .collect();
+    let jumps = Jumps::of(&mut reader.names.graph, &jumping).filter(|_| !is_discrete);
     let graph = &reader.names.graph;
     let tapes = tapes(graph, &states, &outputs, jumps);
     let compiled = events.iter().map(|event| event.compiled(graph));
@@ -268,12 +271,21 @@ impl Reader<'_> {
             return entry.error(format!("{name} has no {key}; give it"));
         };
         self.outline.states.push(quantity(entry, keys)?);
-        Ok(StateText {
+        let state = StateText {
             motion: self.names.value(&motion)?,
             start: self.declared.start(entry, keys, &mut self.names)?,
             noise: self.declared.noise(entry, keys, &mut self.names)?,
             limits: self.limits(entry, keys)?,
-        })
+        };
+        let [start, low, high] = [state.start.mean, state.limits[0], state.limits[1]]
+            .map(|id| self.names.graph.constant(id));
+        if let (true, Some(start), Some(value)) = (state.start.is_given, start, keys.get("start"))
+            && (low.is_some_and(|low| start < low) || high.is_some_and(|high| start > high))
+        {
+            let problem = format!("{name} starts outside its limits; give a start within them");
+            return entry.source.error(value.span().start, problem);
+        }
+        Ok(state)
     }
 
     /// States that only events move have no noise of their own, unless they say so.

@@ -35,8 +35,8 @@ pub(super) struct EventText {
 }
 
 enum TriggerText {
-    /// The margin of the condition.
-    When(Id),
+    /// The margin of the condition, and the condition.
+    When(Id, Id),
     At(Vec<Id>),
 }
 
@@ -66,7 +66,10 @@ fn event(
             match margin(&mut names.graph, condition) {
                 Ok(margin) => {
                     let text = value.get_ref().as_str().unwrap_or_default();
-                    (TriggerText::When(margin), format!("when {}", excerpt(text)))
+                    (
+                        TriggerText::When(margin, condition),
+                        format!("when {}", excerpt(text)),
+                    )
                 }
                 Err(problem) => {
                     return Err(placed.problem(&entry.source, (0, problem.into())));
@@ -167,6 +170,14 @@ impl EventText {
         self.changes.iter().map(|(state, _)| *state)
     }
 
+    /// Returns its condition.
+    pub fn condition(&self) -> Option<Id> {
+        match self.trigger {
+            TriggerText::When(_, condition) => Some(condition),
+            TriggerText::At(_) => None,
+        }
+    }
+
     /// Compiles it to operations.
     pub fn compiled(&self, graph: &Graph) -> Event {
         let states: Vec<usize> = self.states().collect();
@@ -180,7 +191,7 @@ impl EventText {
             }
         };
         match &self.trigger {
-            TriggerText::When(margin) => {
+            TriggerText::When(margin, _) => {
                 let tape = OperationTape::new(graph, &[*margin]);
                 let margin = move |now: &Now<'_>, x: &[f64]| {
                     let mut margin = [0.0];

@@ -197,6 +197,91 @@ fn a_state_that_is_held_at_its_limit_has_its_event() {
     }
 }
 
+/// Conditions that are true in a part of a row alone, by time.
+#[test]
+fn a_condition_of_time_is_met_within_a_row() {
+    let drive = Drive::autonomous(6.0, 4).unwrap();
+    let cases: [(&str, &[f64]); 4] = [
+        ("mod(t, 8) < 1", &[8.0, 16.0]),
+        ("t > 90*k and t < 9.5", &[9.0]),
+        ("x > 0.35 and t > 90*k", &[9.0]),
+        ("t > 6 and t < 7", &[6.0]),
+    ];
+    for rule in ["adaptive", "stiff", "runge-kutta-4"] {
+        for (when, doses) in cases {
+            let text = format!(
+                "[parameters]\nk = {{ prior = [0.05, 0.2] }}\n[states]\nx = {{ rate = \"-k*x\", start = 1.0 }}\n\
+                 [outputs]\ny = {{ value = \"x\" }}\n[[event]]\nwhen = \"{when}\"\nadd = {{ x = 1 }}\n"
+            );
+            let y = under(rule, &text)
+                .simulate(&[0.1], &drive, Noise::OFF)
+                .unwrap();
+            for (row, y) in y.iter().enumerate() {
+                let t = 6.0 * row as f64;
+                let past = doses.iter().filter(|dose| **dose < t);
+                let exact: f64 = [0.0]
+                    .iter()
+                    .chain(past)
+                    .map(|dose| (-0.1 * (t - dose)).exp())
+                    .sum();
+                assert!(
+                    (y - exact).abs() < 1e-3,
+                    "{rule}, {when}, row {row}: {y} {exact}"
+                );
+            }
+        }
+    }
+}
+
+/// What a dose or an event takes beyond a limit goes on from the limit.
+#[test]
+fn doses_and_changes_end_in_limits() {
+    let drive = Drive::new(
+        0.5,
+        Signal::from_shape_fn((5, 1), |(k, _)| [5.0, 0.0][k % 2]),
+    )
+    .unwrap();
+    let free = Drive::autonomous(0.5, 5).unwrap();
+    let state = "x = { start = 0.2, limits = [0, 1], rate =";
+    let dose = format!("[inputs]\nd = {{ hold = \"impulse\" }}\n[states]\n{state} \"d - k*x\" }}");
+    let change = format!(
+        "[states]\n{state} \"-k*x\" }}\nn = {{ rate = \"0\", start = 0.0 }}\n\
+                          [[event]]\nat = [0.0, 1.0, 2.0]\nadd = {{ x = 5 }}\n[[event]]\nwhen = \"x > 0.99\"\nset = {{ n = \"x\" }}"
+    );
+    for rule in ["adaptive", "stiff", "runge-kutta-4"] {
+        for (states, drive) in [(&dose, &drive), (&change, &free)] {
+            let text = format!(
+                "[parameters]\nk = {{ prior = [0.5, 2.0] }}\n{states}\n[outputs]\ny = {{ value = \"x\" }}\n"
+            );
+            let y = under(rule, &text)
+                .simulate(&[1.0], drive, Noise::OFF)
+                .unwrap();
+            let exact = [
+                0.2,
+                (-0.5_f64).exp(),
+                (-1.0_f64).exp(),
+                (-0.5_f64).exp(),
+                (-1.0_f64).exp(),
+            ];
+            let near = y
+                .iter()
+                .zip(exact)
+                .all(|(y, exact)| (y - exact).abs() < 1e-3);
+            assert!(near, "{rule}, {states}: {y} {exact:?}");
+        }
+    }
+    let seen = change
+        .replace("n = { rate = \"0\"", "m = { rate = \"0\"")
+        .replace("set = { n", "set = { m");
+    let text = format!(
+        "[parameters]\nk = {{ prior = [0.5, 2.0] }}\n{seen}\n[outputs]\ny = {{ value = \"m\" }}\n"
+    );
+    let y = under("adaptive", &text)
+        .simulate(&[1.0], &free, Noise::OFF)
+        .unwrap();
+    assert_eq!(y[[4, 0]], 1.0, "an event sees states within their limits");
+}
+
 /// A condition that is true at the start is no event; one that a change turns true is.
 #[test]
 fn events_lead_to_others_and_do_not_begin() {

@@ -66,6 +66,7 @@ impl Workspace {
             calls,
             times: &times,
             is_discrete,
+            limits: &refined.limits,
         };
         let jumps = refined.jumps.as_deref();
         let breaks = breaks(&way, jumps, times.iter().map(|(share, _)| *share));
@@ -101,6 +102,9 @@ impl Workspace {
             };
         let mut before = vec![0.0; x.len()];
         for of in stretches {
+            for (watch, x) in watches.iter_mut().zip(x.chunks_exact_mut(n)) {
+                watch.enter(&events, &mut path, of.from, x);
+            }
             before.copy_from_slice(x);
             step(&mut path, of, x);
             let points = before.chunks_exact(n).zip(x.chunks_exact_mut(n));

@@ -242,6 +242,7 @@ pub(crate) struct Workspace {
     events: EventMemory,
     /// Limits of every way, by state.
     limits: Vec<Interval>,
+    has_events: bool,
     /// `true` while filters that go one after the other have told where rates jump.
     is_together: bool,
 }
@@ -301,6 +302,7 @@ impl Workspace {
             events: EventMemory::default(),
             limits: limits.to_vec(),
             is_together: false,
+            has_events: !events.is_empty(),
         }
     }
 
@@ -337,8 +339,8 @@ impl Workspace {
     /// Hears where rates jump on the next way: `tell` is called with what takes the times of each filter that goes it. Steps to a tolerance end
     /// there.
     pub(super) fn jump_at(&mut self, tell: impl FnOnce(&mut TellJumps<'_>)) {
-        let (Some(_), Some(refined), false) = (&self.schedule, &mut self.refined, self.is_together)
-        else {
+        let is_heard = (self.schedule.is_some() || self.has_events) && !self.is_together;
+        let Some(refined) = self.refined.as_mut().filter(|_| is_heard) else {
             return;
         };
         refined.jumps = None;
@@ -406,6 +408,7 @@ impl Workspace {
         };
         if let Some(between) = now.between {
             between.jump(now, x, &mut refined.inputs, drift);
+            limited(n, x, &refined.limits);
         }
         match &mut self.schedule {
             Some(schedule) => {

@@ -181,6 +181,12 @@ impl Path<'_, '_> {
         })
     }
 
+    /// Returns the share of the way just behind one at which rates or conditions may jump.
+    pub fn behind_jump(&self, at: f64) -> Option<f64> {
+        let is_jump = self.edge > 0.0 && (at == 0.0 || self.breaks.contains(&at));
+        is_jump.then_some(at + self.edge)
+    }
+
     /// Puts points into the limits.
     pub fn limit(&self, x: &mut [f64]) {
         if let Some(limits) = &self.limits {

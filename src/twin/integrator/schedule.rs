@@ -318,6 +318,7 @@ impl SubstepSchedule {
         let mut falls = Falls::default();
         self.stretches.clear();
         while from < 1.0 {
+            enter(path, &mut events, from, x);
             if steps >= patience && falls.repeat() {
                 return SampleSteps::Rough;
             }
@@ -374,8 +375,12 @@ impl SubstepSchedule {
     /// Ends the run of these points.
     fn give_up(&mut self, path: &Path<'_, '_>, x: &mut [f64]) {
         let [from, to] = [path.now.t, path.now.end].map(number);
+        let other = match self.may_change {
+            true => "the stiff integrator",
+            false => "another integrator",
+        };
         self.fault = Some(format!(
-            "the tolerance needs too many steps between t = {from} s and {to} s; give rows between, or choose the stiff integrator"
+            "the tolerance needs too many steps between t = {from} s and {to} s; give rows between, or choose {other}"
         ));
         self.stretches.clear();
         x.fill(f64::NAN);
@@ -445,6 +450,7 @@ impl SubstepSchedule {
         self.is_even = true;
         self.stretches.clear();
         while from < 1.0 {
+            enter(path, &mut events, from, x);
             let end = path.next_break(from);
             let parts = ((end - from) / longest - SHORTEST).ceil().max(1.0);
             let of = Stretch {
@@ -486,6 +492,13 @@ impl SubstepSchedule {
             }
         }
         largest
+    }
+}
+
+/// Fires events of the one point that is carried where a stretch begins.
+fn enter(path: &mut Path<'_, '_>, events: &mut WayEvents<'_>, from: f64, x: &mut [f64]) {
+    if let Some((events, watch)) = events {
+        watch.enter(events, path, from, x);
     }
 }
 

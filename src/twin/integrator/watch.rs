@@ -4,9 +4,10 @@
 //! place then is as smooth a function of states and parameters as the step is. The rest of the stretch is done from there.
 
 use super::event::Event;
-use super::path::{Path, Stretch};
+use super::path::{Path, Stretch, limited};
 use super::{Integrator, Now};
 use crate::math::ascending;
+use crate::twin::Interval;
 
 /// Events of a point between two samples, at most. A ball that comes to rest has infinitely many; twice as many find no more of anything
 /// that is measured, half cuts off what rattles.
@@ -103,6 +104,15 @@ pub(super) struct EventsOfWay<'w> {
     pub times: &'w [(f64, usize)],
     /// `true` where nothing is between samples.
     pub is_discrete: bool,
+    /// Limits that changes end in, by state.
+    pub limits: &'w [(usize, Interval)],
+}
+
+impl EventsOfWay<'_> {
+    /// Puts a point into its limits.
+    fn limit(&self, x: &mut [f64]) {
+        limited(x.len(), x, self.limits);
+    }
 }
 
 /// A condition along the way of a point.
@@ -179,6 +189,7 @@ impl EventWatch {
         let margins = path.at(share, |now| events.calls.margins(now, x));
         let first = self.turned(events, path, (share, &margins), x);
         self.keep_false(&margins);
+        events.limit(x);
         if !first.is_empty() {
             self.fire(events, path, (share, first), x);
         }
@@ -251,6 +262,7 @@ impl EventWatch {
                 events.calls.change(event, now, x);
                 events.calls.margins(now, x)
             });
+            events.limit(x);
             for (i, (before, after)) in margins.iter().zip(&after).enumerate() {
                 if i != event && !is_true(*before) && is_true(*after) {
                     waiting.push(i);
@@ -267,6 +279,19 @@ impl EventWatch {
                     false => WatchState::Pending,
                 };
             }
+        }
+    }
+
+    /// Fires what a jump of a condition turned true where a stretch begins.
+    pub fn enter(
+        &mut self,
+        events: &EventsOfWay<'_>,
+        path: &mut Path<'_, '_>,
+        from: f64,
+        x: &mut [f64],
+    ) {
+        if let Some(inside) = path.behind_jump(from) {
+            self.jumped(events, path, inside, x);
         }
     }
 
