@@ -427,6 +427,22 @@ fn limits_hold_between_rows() {
             assert!(error < 1e-3, "{high}, {record}: {error}");
         }
     }
+    // One row of many meetings, at any tolerance: four swings, of which a fine grid knows the way.
+    let swing = |record: &str| {
+        let text = format!(
+            "[parameters]\nk = {{ prior = [0.1, 2.0] }}\n[states]\nh = {{ rate = \"k*cos(t)\", start = 0.0, limits = [-0.3, 0.5] }}\n\
+             w = {{ rate = \"h\", start = 0.0 }}\n[outputs]\ny = {{ value = \"w\" }}\n[record]\n{record}"
+        );
+        let twin = Equations::parse(&text).unwrap();
+        twin.free_run(&[1.0], &Drive::autonomous(16.0, 2).unwrap())
+            .unwrap()[[1, 0]]
+    };
+    for rule in ["adaptive", "stiff"] {
+        for (tolerance, close) in [("1e-7", 5e-5), ("1e-9", 1e-6)] {
+            let w = swing(&format!("integrator = '{rule}'\ntolerance = {tolerance}"));
+            assert!((w - 2.0612687).abs() < close, "{rule} to {tolerance}: {w}");
+        }
+    }
     // Limits that parameters set in the wrong order hold nothing, and no rate.
     let free = run("1e9", "", 1);
     let crossed = run("\"top - 1\"", "", 1);

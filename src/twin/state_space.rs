@@ -95,7 +95,8 @@ pub trait StateSpace: Send + Sync {
     fn constrain(&self, _now: &Now<'_>, _x: &mut [f64]) {}
 
     /// Times within this step at which the drift jumps whatever the states, in seconds on the record's own clock, as a switch at a time does; in
-    /// any order, without those that do not concern it. [Adaptive](Integrator::Adaptive) and stiff steps end there. `None` by default, for a drift
+    /// any order, without those that do not concern it. [Adaptive](Integrator::Adaptive) and stiff steps end there, and all of a twin with
+    /// events. `None` by default, for a drift
     /// that is smooth in time; a jump that is not told is located by its errors.
     fn jumps(&self, _now: &Now<'_>) -> Option<Vec<f64>> {
         None

@@ -126,6 +126,32 @@ fn a_delay_ends_within_an_adaptive_step() {
     }
 }
 
+/// A dose of a late twin is given once, so much later.
+#[test]
+fn a_delay_holds_events_back() {
+    let text = "[parameters]\nk = { prior = [0.1, 2.0] }\n[states]\nx = { rate = \"-k*x\", start = 1.0 }\n\
+                [outputs]\ny = { value = \"x\", noise = 0.05 }\n[[event]]\nat = [0.0, 1.0]\nadd = { x = 1 }";
+    let base = Twin::from(Arc::new(Equations::parse(text).unwrap()));
+    let delay = Catalogue::default()
+        .effect("sensor-delay", "sensor")
+        .unwrap();
+    let twin = augment_late(base, vec![delay]).unwrap();
+    let drive = Drive::autonomous(2.0, 8).unwrap();
+    for delay in [0.0, 0.5, 1.0, 5.3, 10.0] {
+        let run = twin.free_run(&[0.2, delay], &drive).unwrap();
+        for (k, y) in run.iter().enumerate() {
+            let t = 2.0 * k as f64 - delay;
+            let doses = [0.0, 1.0].iter().filter(|at| **at < t);
+            let all: f64 = [0.0]
+                .iter()
+                .chain(doses)
+                .map(|at| (-0.2 * (t.max(0.0) - at)).exp())
+                .sum();
+            assert!((y - all).abs() < 1e-6, "{delay}, row {k}: {y}, {all}");
+        }
+    }
+}
+
 /// A step of a parameter within a sample of adaptive steps acts at its time: y = t, and half of what is behind it more.
 #[test]
 fn a_step_of_a_parameter_acts_at_its_time() {

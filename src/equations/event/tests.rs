@@ -1,9 +1,10 @@
 //! Events of texts: where they are, and what they do to likelihoods.
 
+use crate::effect::{Catalogue, augment};
 use crate::equations::Equations;
 use crate::likelihood::kalman::{FilterSettings, Kalman};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{DigitalTwin, Noise};
+use crate::twin::{DigitalTwin, Noise, Twin};
 use std::sync::Arc;
 
 /// A ball with its heights and the exact ones: between bounces parabolas.
@@ -156,6 +157,20 @@ fn doses_at_times_are_those_of_an_input() {
     }
 }
 
+/// A step of a parameter within a row of discrete time acts at a row, beside events, too.
+#[test]
+fn laws_with_a_time_cut_no_row_of_discrete_time() {
+    let text = "[parameters]\nk = { prior = [0.5, 2.0] }\n[states]\nx = { next = \"x + k\", start = 0.0 }\n\
+        [outputs]\ny = { value = \"x\" }\n[[event]]\nwhen = \"x > 100\"\nset = { x = 0 }\n";
+    let base = Twin::from(Arc::new(Equations::parse(text).unwrap()));
+    let step = Catalogue::default().effect("parameter-step", "k").unwrap();
+    let twin = augment(base, vec![step]).unwrap();
+    let drive = Drive::autonomous(1.0, 8).unwrap();
+    let y = twin.free_run(&[1.0, 0.5, 4.5], &drive).unwrap();
+    let expected = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0];
+    assert_eq!(y.iter().copied().collect::<Vec<f64>>(), expected);
+}
+
 /// A counter in discrete time: an event acts at rows.
 #[test]
 fn events_in_discrete_time_act_at_rows() {
@@ -192,6 +207,36 @@ fn a_state_that_is_held_at_its_limit_has_its_event() {
                     (y - exact).abs() < 1e-6,
                     "{rule}, h {full} 2 from {start}, row {row}: {y} {exact}"
                 );
+            }
+        }
+    }
+}
+
+/// An event of a state that stays at its limit is one, in long rows and in short ones.
+#[test]
+fn a_state_at_its_limit_has_its_event_once() {
+    let text = |rate: &str, limits: &str, when: &str| {
+        format!(
+            "[parameters]\na = {{ prior = [0.1, 2.0] }}\n\
+             [states]\nh = {{ rate = \"{rate}\", start = 0.0, limits = {limits} }}\nn = {{ rate = \"0\", start = 0.0 }}\n\
+             [outputs]\ny = {{ value = \"n\" }}\n[[event]]\nwhen = \"{when}\"\nadd = {{ n = 1 }}\n"
+        )
+    };
+    let filled = text("a + 0*floor(t)", "[0, 2]", "h >= 2");
+    // The upper limit is met once a period, at 0.52 s first.
+    let swung = text("a*cos(t)", "[-0.3, 0.5]", "h >= 0.5");
+    for rule in ["adaptive", "stiff", "runge-kutta-4"] {
+        for (text, counts) in [(&filled, 1.0), (&swung, 3.0)] {
+            for (step, rows) in [(0.1, 161), (2.0, 9)] {
+                let drive = Drive::autonomous(step, rows).unwrap();
+                // Steps of one length pass by what is shorter.
+                if rule == "runge-kutta-4" && step > 1.0 {
+                    continue;
+                }
+                let y = under(rule, text)
+                    .simulate(&[1.0], &drive, Noise::OFF)
+                    .unwrap();
+                assert_eq!(y[[rows - 1, 0]], counts, "{rule}, {text}, step {step}");
             }
         }
     }

@@ -286,6 +286,7 @@ fn carry<T: StateSpace>(
     let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| rates(twin, now, x, dx);
     let calls = EventCalls {
         list: events,
+        late: 0.0,
         states: x.len(),
         inside: &|now, _, then| then(now),
     };

@@ -186,6 +186,7 @@ impl Composed {
         let calls = EventCalls {
             list: &self.parts.outline.events,
             states: self.parts.states,
+            late: self.parts.late(now.theta, 0),
             inside: &|now, x, then| self.inside(now, Some(x), |own| then(own)),
         };
         work.carry_with_events(&calls, n, now, x, drift);
@@ -282,8 +283,11 @@ impl Composed {
             }
             tell(now, times);
         });
-        if late > 0.0 {
-            tell(now, Some(vec![now.begun + late]));
+        for delay in 0..self.parts.delays() {
+            tell(
+                now,
+                Some(vec![now.begun + self.parts.late(now.theta, delay)]),
+            );
         }
         for added in &self.parts.list {
             if let TwinPart::Law(part) = &added.part

@@ -341,6 +341,11 @@ impl Parts {
         self.delays[delay].iter().map(|&j| theta[j]).sum()
     }
 
+    /// Number of delays of the whole twin.
+    pub fn delays(&self) -> usize {
+        self.delays.len()
+    }
+
     /// Returns by how many seconds what is behind the delays from this index on is late.
     pub fn late(&self, theta: &[f64], delays: usize) -> f64 {
         let delays = delays.min(self.delays.len())..self.delays.len();

@@ -2,7 +2,7 @@
 
 use super::{Finding, Outcome, warned};
 use crate::math::{deviation, three_digits};
-use crate::record::{Drive, Signal};
+use crate::record::{Drive, LARGEST, Signal};
 use crate::setting::{number, unit_suffix};
 use crate::twin::{
     Composed, Integrator, MOST_SUBSTEPS, Noise, SimulationError, StepsTaken, TOLERANCES, Twin,
@@ -57,15 +57,23 @@ pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Fi
     Some(Finding::of("step", outcome))
 }
 
-/// The step's fault and remedy where a run at θ diverges with the twin's own fixed steps, and one to a tolerance does not.
+/// The step's fault and remedy where a run at θ diverges or grows beyond records with the twin's own fixed steps, and one to a tolerance does not.
 pub(crate) fn blamed_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<&'static str> {
     let (own, _) = twin.integration()?;
     if !matches!(own, Integrator::Euler | Integrator::RungeKutta4) {
         return None;
     }
-    let error = twin.free_run(theta, drive).err()?;
     let adaptive = twin.stepped(|rule, _| *rule = Integrator::Adaptive)?;
-    (error.costs_one_run() && adaptive.free_run(theta, drive).is_ok()).then_some(DIVERGES)
+    let is_held = |run: &Signal| run.iter().all(|y| y.abs() <= LARGEST);
+    let is_blown = match twin.free_run(theta, drive) {
+        Ok(run) => !is_held(&run),
+        Err(error) => error.costs_one_run(),
+    };
+    (is_blown
+        && adaptive
+            .free_run(theta, drive)
+            .is_ok_and(|run| is_held(&run)))
+    .then_some(DIVERGES)
 }
 
 /// Outcome of a comparison of a step with half of it.
@@ -143,7 +151,8 @@ fn finer_steps(twin: &Twin, theta: &[f64], drive: &Drive) -> [Vec<(String, Twin)
         taken.mean().max(stepping.substeps)
     });
     let more = [4, 16].map(|factor| (factor * now).min(MOST_SUBSTEPS));
-    let more = more.into_iter().filter(|many| *many > now);
+    let last = (more[0] < more[1]).then_some(more[1]);
+    let more = [more[0]].into_iter().chain(last).filter(|many| *many > now);
     let more = more.filter_map(|many| {
         let finer = twin.stepped(|_, stepping| stepping.substeps = many)?;
         Some((format!("{many} substeps"), finer))

@@ -1,6 +1,6 @@
 //! Twins with one flaw each.
 
-use super::step::step_error;
+use super::step::{blamed_step, step_error};
 use super::*;
 use crate::record::{Quantity, Signals};
 use crate::twin::fixture::OneState;
@@ -146,6 +146,9 @@ fn a_step_that_is_too_long_is_named_by_output() {
         "{}",
         wild.message
     );
+    let large = blamed_step(&twin, &[250.0], &drive);
+    assert!(large.is_some(), "a run that ends at 1e110 is blamed");
+    assert!(blamed_step(&twin, &[15.0], &drive).is_none());
     let growing = check_step(&twin, &[-2e5], &drive).unwrap();
     assert!(growing.message.contains("not known"), "{}", growing.message);
     let boxed: Arc<dyn DigitalTwin> = Arc::new(Flawed(Flaw::None, AtomicU64::new(0)));

@@ -68,6 +68,8 @@ impl Workspace {
             is_discrete,
             limits: &refined.limits,
         };
+        limited(n, x, &refined.limits);
+        let beyond = Some(&mut refined.beyond).filter(|_| self.schedule.is_some());
         let jumps = refined.jumps.as_deref();
         let breaks = breaks(&way, jumps, times.iter().map(|(share, _)| *share));
         let mut path = Path {
@@ -76,12 +78,8 @@ impl Workspace {
             drift,
             breaks: &breaks,
             edge: edge(&way, jumps),
-            limits: LimitsOfWay::of(
-                n,
-                &refined.limits,
-                (&mut refined.within, &mut refined.beyond),
-            )
-            .filter(|_| rule.is_between()),
+            limits: LimitsOfWay::of(n, &refined.limits, (&mut refined.within, beyond))
+                .filter(|_| rule.is_between()),
         };
         let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
         let of_centre = Some((&events, watches[0].clone()));

@@ -243,6 +243,8 @@ pub(crate) struct Workspace {
     /// Limits of every way, by state.
     limits: Vec<Interval>,
     has_events: bool,
+    /// `true` where the way before had limits of its own.
+    is_limited: bool,
     /// `true` while filters that go one after the other have told where rates jump.
     is_together: bool,
 }
@@ -303,6 +305,7 @@ impl Workspace {
             limits: limits.to_vec(),
             is_together: false,
             has_events: !events.is_empty(),
+            is_limited: false,
         }
     }
 
@@ -339,7 +342,8 @@ impl Workspace {
     /// Hears where rates jump on the next way: `tell` is called with what takes the times of each filter that goes it. Steps to a tolerance end
     /// there.
     pub(super) fn jump_at(&mut self, tell: impl FnOnce(&mut TellJumps<'_>)) {
-        let is_heard = (self.schedule.is_some() || self.has_events) && !self.is_together;
+        let is_between = self.integrator != Integrator::Discrete && !self.is_together;
+        let is_heard = (self.schedule.is_some() || self.has_events) && is_between;
         let Some(refined) = self.refined.as_mut().filter(|_| is_heard) else {
             return;
         };
@@ -370,11 +374,13 @@ impl Workspace {
         if self.refined.is_none() && !self.integrator.is_between() {
             return;
         }
-        let Some(told) = told() else {
+        let told = told();
+        if told.is_none() && !self.is_limited {
             return;
-        };
+        }
+        self.is_limited = told.is_some();
         let mut limits = self.limits.clone();
-        for (limit, told) in limits.iter_mut().zip(told) {
+        for (limit, told) in limits.iter_mut().zip(told.unwrap_or_default()) {
             *limit = limit.and(told);
         }
         self.refined.get_or_insert_default().limits = felt(&limits);
@@ -408,8 +414,8 @@ impl Workspace {
         };
         if let Some(between) = now.between {
             between.jump(now, x, &mut refined.inputs, drift);
-            limited(n, x, &refined.limits);
         }
+        limited(n, x, &refined.limits);
         match &mut self.schedule {
             Some(schedule) => {
                 let jumps = refined.jumps.as_deref();
@@ -422,7 +428,7 @@ impl Workspace {
                     limits: LimitsOfWay::of(
                         n,
                         &refined.limits,
-                        (&mut refined.within, &mut refined.beyond),
+                        (&mut refined.within, Some(&mut refined.beyond)),
                     ),
                 };
                 schedule.carry(&mut path, x);
@@ -502,12 +508,8 @@ impl Integrator {
     ) {
         let m = refined.substeps.max(1);
         let h = now.dt / m as f64;
-        let mut limits = LimitsOfWay::of(
-            n,
-            &refined.limits,
-            (&mut refined.within, &mut refined.beyond),
-        )
-        .filter(|_| self.is_between());
+        let mut limits = LimitsOfWay::of(n, &refined.limits, (&mut refined.within, None))
+            .filter(|_| self.is_between());
         let mut drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| match &mut limits {
             Some(limits) => limits.rates(drift, now, x, dx),
             None => drift(now, x, dx),

@@ -39,9 +39,9 @@ pub(super) struct LimitsOfWay<'p> {
     states: usize,
     /// Limits that are felt, by state.
     felt: &'p [(usize, Interval)],
-    /// Buffers: points within their limits, and stages beyond each end so far.
+    /// Buffers: points within their limits, and stages beyond each end so far, where steps have errors.
     within: &'p mut Vec<f64>,
-    beyond: &'p mut Vec<[Beyond; 2]>,
+    beyond: Option<&'p mut Vec<[Beyond; 2]>>,
 }
 
 /// Stages of a step beside an end of a limit.
@@ -80,7 +80,7 @@ impl<'p> LimitsOfWay<'p> {
     pub fn of(
         states: usize,
         felt: &'p [(usize, Interval)],
-        (within, beyond): (&'p mut Vec<f64>, &'p mut Vec<[Beyond; 2]>),
+        (within, beyond): (&'p mut Vec<f64>, Option<&'p mut Vec<[Beyond; 2]>>),
     ) -> Option<Self> {
         let limits = Self {
             states,
@@ -102,10 +102,12 @@ impl<'p> LimitsOfWay<'p> {
 
     /// Sees a stage with its rates.
     fn see(&mut self, x: &[f64], dx: &[f64]) {
-        let (points, is_first) = (x.len() / self.states, self.beyond.is_empty());
-        self.beyond
-            .resize(points * self.felt.len(), Default::default());
-        for (&(j, limit), beyond) in self.felt.iter().zip(self.beyond.chunks_exact_mut(points)) {
+        let Some(beyond) = &mut self.beyond else {
+            return;
+        };
+        let (points, is_first) = (x.len() / self.states, beyond.is_empty());
+        beyond.resize(points * self.felt.len(), Default::default());
+        for (&(j, limit), beyond) in self.felt.iter().zip(beyond.chunks_exact_mut(points)) {
             let of = x.iter().zip(dx).skip(j).step_by(self.states);
             for ((x, dx), [below, above]) in of.zip(beyond) {
                 below.see(is_first, limit.low() - x, -dx);
@@ -117,8 +119,11 @@ impl<'p> LimitsOfWay<'p> {
     /// Sets errors of points at `x` to those that are left within the limits: what is beyond one for both orders has none. A state that was beyond
     /// one and turned back left it late by as much.
     fn errors(&self, h: f64, x: &[f64], errors: &mut [f64]) {
+        let Some(beyond) = &self.beyond else {
+            return;
+        };
         let points = x.len() / self.states;
-        for (&(j, limit), beyond) in self.felt.iter().zip(self.beyond.chunks_exact(points)) {
+        for (&(j, limit), beyond) in self.felt.iter().zip(beyond.chunks_exact(points)) {
             let of = x.iter().zip(&mut *errors).skip(j).step_by(self.states);
             for ((x, error), [below, above]) in of.zip(beyond) {
                 let other = *x - *error;
@@ -203,8 +208,12 @@ impl Path<'_, '_> {
 
     /// Begins a step, of which no stage has been.
     pub fn begin_step(&mut self) {
-        if let Some(limits) = &mut self.limits {
-            limits.beyond.clear();
+        if let Some(beyond) = self
+            .limits
+            .as_mut()
+            .and_then(|limits| limits.beyond.as_mut())
+        {
+            beyond.clear();
         }
     }
 

@@ -88,16 +88,20 @@ struct Falls {
     /// Failures in a row, and rows of two behind the first kept step.
     row: usize,
     rows: usize,
+    /// Kept steps in a row.
+    kept_in_row: usize,
 }
 
 impl Falls {
     fn see(&mut self, is_kept: bool, reach: f64) {
         if is_kept {
             self.kept += 1;
+            self.kept_in_row += 1;
             self.unstable += usize::from(reach > pair::STABLE);
             self.row = 0;
             return;
         }
+        self.kept_in_row = 0;
         self.row += 1;
         self.rows += usize::from(self.row == 2 && self.kept > 0);
     }
@@ -315,15 +319,18 @@ impl SubstepSchedule {
         };
         let ScheduleBuffers { trial, errors, .. } = buffers;
         let (mut next, mut from, mut steps, mut shortest) = (self.next, 0.0, 0, SHORTEST);
+        // Tries up to the last place at which several steps in a row were kept.
+        let mut settled = 0;
         let mut falls = Falls::default();
         self.stretches.clear();
         while from < 1.0 {
             enter(path, &mut events, from, x);
-            if steps >= patience && falls.repeat() {
+            let tries = steps - settled;
+            if tries >= patience && falls.repeat() {
                 return SampleSteps::Rough;
             }
             let lengths = JUMPS.map(|factor| factor * next / dt);
-            if steps > 0 && steps % patience == 0 && self.jumps(path, x, from, lengths) {
+            if tries > 0 && tries % patience == 0 && self.jumps(path, x, from, lengths) {
                 return SampleSteps::Rough;
             }
             // Explicit steps that are short for another reason than stiffness go on.
@@ -349,12 +356,16 @@ impl SubstepSchedule {
             path.limit_errors(of, trial, errors);
             let size = self.largest((x, trial), errors);
             falls.see(size <= 1.0, self.explicit.reach());
+            // A single run goes on from jump to jump.
+            if falls.kept_in_row == FEW && patience > FEW {
+                (settled, falls.rows) = (steps, 0);
+            }
             let factor = match size.is_finite() {
                 true => (SAFETY * size.powf(-1.0 / order)).clamp(CHANGE.0, CHANGE.1),
                 false => CHANGE.0,
             };
             // A step that a jump cuts short says little of the next.
-            let is_cut = path.edge > 0.0 && of.length < longest && size <= 1.0;
+            let is_cut = path.edge > 0.0 && parts == 1.0 && of.length < longest && size <= 1.0;
             let before = if is_cut { next } else { 0.0 };
             next = before.max(factor * of.length * dt);
             // A thousand steps with a thousandth of a state's size each are no way. At a jump of rates, a shortest step may have any error.

@@ -188,6 +188,23 @@ fn a_step_ends_at_a_jump_that_is_told() {
     }
 }
 
+/// A block that dry friction holds or lets go: where its rates jump again and again, a run takes steps of one length.
+#[test]
+fn a_run_at_rest_takes_few_steps() {
+    for (push, samples) in [(0.5, 20), (0.99, 20), (0.5, 4), (1.5, 20)] {
+        let block = |t: f64, x: &[f64], dx: &mut [f64]| {
+            let friction = if x[1] == 0.0 { 0.0 } else { x[1].signum() };
+            (dx[0], dx[1]) = (x[1], push * (0.7 * t).cos() - friction);
+        };
+        let start = [0.0, 0.4];
+        let (_, taken) = carried((Integrator::Adaptive, 1e-7), start, (20.0, samples), block);
+        assert!(
+            taken.substeps <= 40 * samples,
+            "{push}, {samples}: {taken:?}"
+        );
+    }
+}
+
 /// A level that rises and falls, held at 0.16 from 0.2 to 0.5 s, and what it fills; both also upside down.
 #[test]
 fn a_limit_holds_within_a_step() {

@@ -36,6 +36,8 @@ pub(crate) struct EventCalls<'e> {
     /// Number of the twin's own states, the first of a point.
     pub states: usize,
     pub inside: &'e InsideOf<'e>,
+    /// Seconds by which its clock is late.
+    pub late: f64,
 }
 
 impl EventCalls<'_> {
@@ -68,14 +70,17 @@ impl EventCalls<'_> {
     ) -> Result<Vec<(f64, usize)>, &Event> {
         let (mut all, mut undefined) = (vec![], None);
         (self.inside)(now, x, &mut |own| {
+            // A clock that stands until a delay is over shows no time twice.
+            let t = now.t - self.late;
             for (i, event) in self.list.iter().enumerate() {
-                let times = event.times(own);
+                let mut times = event.times(own);
+                times.retain(|at| self.late == 0.0 || *at >= now.begun);
                 let margin = event.margin(own, &x[..self.states]);
                 if margin.is_nan() || times.iter().any(|at| at.is_nan()) {
                     undefined.get_or_insert(event);
                 }
                 for at in times {
-                    let share = (at - own.t) / now.dt;
+                    let share = (at - t) / now.dt;
                     // A clock of days has a share of a step in its last digits.
                     let same = SAME.max(4.0 * f64::EPSILON * own.t.abs() / now.dt);
                     match share {
@@ -146,13 +151,17 @@ impl EventWatch {
         x: &mut [f64],
     ) -> Self {
         let margins = path.at(0.0, |now| events.calls.margins(now, x));
-        let condition = |(i, margin): (usize, &f64)| match before {
-            _ if !is_true(*margin) => WatchState::False,
-            Some(before) if !before[i] => WatchState::Pending,
-            _ => WatchState::True,
-        };
+        let mut conditions = vec![];
+        for (i, margin) in margins.iter().enumerate() {
+            conditions.push(match before {
+                Some(before) if before[i] && is_held(events, path, (0.0, i), x) => WatchState::True,
+                _ if !is_true(*margin) => WatchState::False,
+                Some(before) if !before[i] => WatchState::Pending,
+                _ => WatchState::True,
+            });
+        }
         let mut watch = Self {
-            conditions: margins.iter().enumerate().map(condition).collect(),
+            conditions,
             passed: 0,
             fired: 0,
             at_once: 0,
@@ -188,7 +197,11 @@ impl EventWatch {
     ) {
         let margins = path.at(share, |now| events.calls.margins(now, x));
         let first = self.turned(events, path, (share, &margins), x);
-        self.keep_false(&margins);
+        for (i, margin) in margins.iter().enumerate() {
+            if !is_true(*margin) && !is_held(events, path, (share, i), x) {
+                self.conditions[i] = WatchState::False;
+            }
+        }
         events.limit(x);
         if !first.is_empty() {
             self.fire(events, path, (share, first), x);
@@ -204,7 +217,7 @@ impl EventWatch {
         x: &mut [f64],
     ) {
         while let Some(&(at, event)) = events.times.get(self.passed) {
-            if at > share + SAME {
+            if at > share + SAME.max(path.edge) {
                 break;
             }
             self.passed += 1;
@@ -365,6 +378,13 @@ impl EventWatch {
         }
         self.reach(events, path, end, to);
     }
+}
+
+/// Returns whether the motion leads into a condition, at a limit that holds the state out of it.
+fn is_held(events: &EventsOfWay<'_>, path: &mut Path<'_, '_>, at: (f64, usize), x: &[f64]) -> bool {
+    let mut ends = events.limits.iter();
+    ends.any(|&(j, limit)| x[j] == limit.low() || x[j] == limit.high())
+        && grows(events, path, at, x)
 }
 
 /// Returns whether the motion leads further into a condition, or does not change it.
