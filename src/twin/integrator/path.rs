@@ -47,7 +47,7 @@ pub(super) struct LimitsOfWay<'p> {
 /// Stages of a step beside an end of a limit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Beyond {
-    /// How far a stage was beyond it, at most.
+    /// Largest distance of a stage beyond it.
     far: f64,
     /// Rate on where the step began, if at the limit, and at its last stage.
     first: f64,
