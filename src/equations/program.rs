@@ -21,7 +21,7 @@ pub(crate) struct Program {
 #[derive(Debug)]
 pub(super) struct Tapes {
     pub drift: OperationTape,
-    /// Times at which the drift jumps.
+    /// Times at which the drift jumps, or a condition of an event does.
     pub jumps: Option<Jumps>,
     pub observe: OperationTape,
     /// Levels of states, then of outputs.

@@ -278,7 +278,7 @@ fn a_condition_of_time_is_met_within_a_row() {
     }
 }
 
-/// What a dose or an event takes beyond a limit goes on from the limit.
+/// A state that a dose or an event takes beyond a limit goes on from the limit.
 #[test]
 fn doses_and_changes_end_in_limits() {
     let drive = Drive::new(

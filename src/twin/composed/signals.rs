@@ -261,24 +261,26 @@ impl Composed {
     /// earlier.
     pub(crate) fn dead_time(&self, theta: &[f64], dt: f64) -> Vec<usize> {
         let mut all = vec![];
-        for part in self.parts.laws().filter(|part| part.is_dead_time) {
-            if let Law::Sensor(_) = part.law {
-                all.resize(self.outputs(), 0);
-                let theta = self.complete(theta);
-                all[part.target] += whole_samples(part.m(&theta)[0], dt);
-            }
+        for part in self.late_sensors() {
+            all.resize(self.outputs(), 0);
+            let theta = self.complete(theta);
+            all[part.target] += whole_samples(part.m(&theta)[0], dt);
         }
         all
+    }
+
+    /// Delays of sensors.
+    fn late_sensors(&self) -> impl Iterator<Item = &LawPart> {
+        let is_late = |part: &&LawPart| part.is_dead_time && matches!(part.law, Law::Sensor(_));
+        self.parts.laws().filter(is_late)
     }
 
     /// Sets delays of sensors to zero in all of θ, and returns those of each output in seconds; empty where none has one.
     pub(super) fn take_delays(&self, theta: &mut [f64]) -> Vec<f64> {
         let mut all = vec![];
-        for part in self.parts.laws().filter(|part| part.is_dead_time) {
-            if let Law::Sensor(_) = part.law {
-                all.resize(self.outputs(), 0.0);
-                all[part.target] += std::mem::take(&mut theta[part.magnitudes.start]);
-            }
+        for part in self.late_sensors() {
+            all.resize(self.outputs(), 0.0);
+            all[part.target] += std::mem::take(&mut theta[part.magnitudes.start]);
         }
         all
     }

@@ -88,7 +88,7 @@ impl Workspace {
                 let way = (&mut path, x.len() > n);
                 schedule.chosen(way, &mut x[..n].to_vec(), &of_centre)
             }
-            None => path.equal(refined.substeps.max(1)),
+            None => path.equal(refined.substeps),
         };
         if stretches.is_empty() {
             return x.fill(f64::NAN);

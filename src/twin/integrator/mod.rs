@@ -260,9 +260,8 @@ pub(super) struct StepBuffers {
 }
 
 /// Rule by which a twin moves between samples.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 struct Refined {
-    /// Number of fixed steps, 0 for one.
     substeps: usize,
     /// Limits that are felt, by state.
     limits: Vec<(usize, Interval)>,
@@ -292,14 +291,8 @@ impl Workspace {
         Self {
             stages: StepBuffers::of(limits.len()),
             integrator,
-            refined: is_refined.then(|| Refined {
-                substeps: stepping.substeps.max(1),
-                limits: felt(limits),
-                inputs: vec![0.0; holds.len()],
-                within: vec![],
-                beyond: vec![],
-                jumps: None,
-            }),
+            refined: is_refined
+                .then(|| Refined::of(stepping.substeps.max(1), holds.len(), felt(limits))),
             schedule,
             events: EventMemory::default(),
             limits: limits.to_vec(),
@@ -340,7 +333,7 @@ impl Workspace {
     }
 
     /// Hears where rates jump on the next way: `tell` is called with what takes the times of each filter that goes it. Steps to a tolerance end
-    /// there.
+    /// there, and all of a twin with events.
     pub(super) fn jump_at(&mut self, tell: impl FnOnce(&mut TellJumps<'_>)) {
         let is_between = self.integrator != Integrator::Discrete && !self.is_together;
         let is_heard = (self.schedule.is_some() || self.has_events) && is_between;
@@ -383,7 +376,12 @@ impl Workspace {
         for (limit, told) in limits.iter_mut().zip(told.unwrap_or_default()) {
             *limit = limit.and(told);
         }
-        self.refined.get_or_insert_default().limits = felt(&limits);
+        let felt = felt(&limits);
+        match &mut self.refined {
+            Some(refined) => refined.limits = felt,
+            // One step, and inputs that are held.
+            None => self.refined = Some(Refined::of(1, 0, felt)),
+        }
     }
 
     /// Buffers of a single step.
@@ -443,6 +441,20 @@ impl Workspace {
     /// A buffer for `states` states.
     pub(super) fn stage(&mut self, states: usize) -> &mut [f64] {
         grown(&mut self.stages.stage, states)
+    }
+}
+
+impl Refined {
+    /// For so many fixed steps and inputs, and these limits.
+    fn of(substeps: usize, inputs: usize, limits: Vec<(usize, Interval)>) -> Self {
+        Self {
+            substeps,
+            limits,
+            inputs: vec![0.0; inputs],
+            within: vec![],
+            beyond: vec![],
+            jumps: None,
+        }
     }
 }
 
@@ -506,7 +518,7 @@ impl Integrator {
         (work, refined): (&mut StepBuffers, &mut Refined),
         drift: &mut Rates<'_>,
     ) {
-        let m = refined.substeps.max(1);
+        let m = refined.substeps;
         let h = now.dt / m as f64;
         let mut limits = LimitsOfWay::of(n, &refined.limits, (&mut refined.within, None))
             .filter(|_| self.is_between());
