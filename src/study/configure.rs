@@ -163,6 +163,13 @@ impl Study {
                     }
                 )));
             }
+            let rule = integrator.unwrap_or(own);
+            if tolerance.is_some() && !rule.is_adaptive() {
+                return Err(StudyError::Plan(
+                    "tolerance: the integrator takes steps of one length; remove it, or choose adaptive or stiff"
+                        .into(),
+                ));
+            }
         }
         let change = |rule: &mut Integrator, stepping: &mut Stepping| {
             *rule = integrator.unwrap_or(*rule);

@@ -120,7 +120,8 @@ impl Rosenbrock {
         }
     }
 
-    /// Decompositions of 1/(γh) − ∂f/∂x, one for each point, by differences that all points share.
+    /// Decompositions of 1/(γh) − ∂f/∂x, one for each point, by differences that all points share, to the side that each moves to: a state at a
+    /// jump of its rate leaves it.
     fn solvers(
         &mut self,
         path: &mut Path<'_, '_>,
@@ -128,23 +129,44 @@ impl Rosenbrock {
         (sizes, x): (&[f64], &[f64]),
     ) -> Vec<LU<f64, Dyn, Dyn>> {
         let (h, n) = (path.seconds(of), sizes.len());
-        let [first, _, now] = &mut self.rates;
+        let [first, near, far] = &mut self.rates;
+        let stage = &mut self.stage;
         let mut matrices = vec![DMatrix::zeros(n, n); x.len() / n];
         for j in 0..n {
-            for (p, stage) in self.stage.chunks_exact_mut(n).enumerate() {
-                let rate = first[p * n + j];
-                let size = x[p * n + j].abs().max(sizes[j]).max((h * rate).abs());
+            for at in (0..x.len()).step_by(n) {
+                let (x, rate) = (x[at + j], first[at + j]);
+                let size = x.abs().max(sizes[j]).max((h * rate).abs());
                 let step = HALF_DIGITS * size.max(f64::MIN_POSITIVE.sqrt());
-                stage[j] += path.side(j, (x[p * n + j], step), rate) * step;
+                stage[at + j] += path.side(j, (x, step), rate) * step;
             }
-            path.rates(of, 0.0, &self.stage, now);
+            path.rates(of, 0.0, stage, near);
+            // What is as steep as a jump over the step may be one, of which a second difference behind the first shows nothing.
+            let is_steep = (0..x.len()).any(|i| {
+                let size = x[i].abs().max(sizes[i % n]);
+                h * (near[i] - first[i]).abs() > HALF_DIGITS * size
+            });
+            if is_steep {
+                for at in (0..x.len()).step_by(n) {
+                    stage[at + j] += stage[at + j] - x[at + j];
+                }
+                path.rates(of, 0.0, stage, far);
+            }
             for (p, matrix) in matrices.iter_mut().enumerate() {
                 let at = p * n;
-                let difference = self.stage[at + j] - x[at + j];
-                for i in 0..n {
-                    matrix[(i, j)] = (first[at + i] - now[at + i]) / difference;
+                let mut difference = stage[at + j] - x[at + j];
+                stage[at + j] = x[at + j];
+                let (mut from, mut to) = (&first[..], &near[..]);
+                if is_steep {
+                    difference *= 0.5;
+                    // A state that is pushed back behind a jump is held by it.
+                    let is_held = near[at + j] * first[at + j] < 0.0;
+                    if !is_held {
+                        (from, to) = (&near[..], &far[..]);
+                    }
                 }
-                self.stage[at + j] = x[at + j];
+                for i in 0..n {
+                    matrix[(i, j)] = (from[at + i] - to[at + i]) / difference;
+                }
             }
         }
         let decomposed = matrices.into_iter().map(|mut matrix| {

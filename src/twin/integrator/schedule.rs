@@ -4,8 +4,8 @@
 use super::pair::{self, ExplicitPair};
 use super::path::{Path, Stretch};
 use super::rosenbrock::{self, Rosenbrock};
+use super::rule::{Integrator, MOST_SUBSTEPS, Stepping};
 use super::watch::{EventWatch, EventsOfWay, StepBy};
-use super::{Integrator, MOST_SUBSTEPS, Stepping};
 use crate::math::three_digits;
 use crate::setting::number;
 use serde::Serialize;

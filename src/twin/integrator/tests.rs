@@ -1,6 +1,7 @@
 use super::pair::ExplicitPair;
-use super::path::Stretch;
+use super::path::{Path, Stretch};
 use super::rosenbrock::Rosenbrock;
+use super::rule::StepBuffers;
 use super::*;
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
 use crate::record::{Drive, Record};
@@ -205,6 +206,23 @@ fn a_run_at_rest_takes_few_steps() {
     }
 }
 
+/// A state that begins exactly where its rate jumps, small jumps and large ones: differences across it would hold the state for a step.
+#[test]
+fn a_state_leaves_a_jump_where_it_begins() {
+    for (rule, jump) in [Integrator::Adaptive, Integrator::Stiff]
+        .into_iter()
+        .flat_map(|rule| [1e-6, 1e-3, 0.2, -0.4].map(|jump| (rule, jump)))
+    {
+        let sign = |x: f64| if x == 0.0 { 0.0 } else { x.signum() };
+        let (x, _) = carried((rule, 1e-7), [0.7, 1.0], (1.0, 10), |_, x, dx| {
+            dx[0] = -0.5 - jump * sign(x[0] - 0.7);
+            dx[1] = -1e4 * (x[1] - x[0]);
+        });
+        let off = x[0] - (0.2 + jump);
+        assert!(off.abs() < 1e-4, "{rule:?}, {jump}: {off}");
+    }
+}
+
 /// A level that rises and falls, held at 0.16 from 0.2 to 0.5 s, and what it fills; both also upside down.
 #[test]
 fn a_limit_holds_within_a_step() {
@@ -302,7 +320,7 @@ fn apart<const N: usize>(a: [f64; N], b: [f64; N], sizes: [f64; N]) -> f64 {
 #[test]
 fn stiff_systems_are_carried_to_a_millionth_of_their_scale() {
     use Integrator::{Adaptive, Stiff};
-    let at = |rule| (rule, TOLERANCE);
+    let at = |rule| (rule, Stepping::default().tolerance);
     for rule in [Adaptive, Stiff] {
         let (x, _) = carried(at(rule), [1.0, 0.0, 0.0], (40.0, 40), robertson);
         let known = [
@@ -349,7 +367,7 @@ fn stiff_systems_are_carried_to_a_millionth_of_their_scale() {
 /// Explicit steps stay where they serve, and give way where they are many.
 #[test]
 fn the_method_follows_the_system() {
-    let adaptive = (Integrator::Adaptive, TOLERANCE);
+    let adaptive = (Integrator::Adaptive, Stepping::default().tolerance);
     let (_, taken) = carried(adaptive, [1.5, 3.0], (20.0, 200), brusselator);
     assert_eq!(taken.implicit, 0, "{taken:?}");
     let (_, taken) = carried(adaptive, [2.0, 0.0], (2000.0, 400), van_der_pol);
@@ -401,7 +419,7 @@ fn points_that_friction_stops_take_steps_of_one_length() {
 /// An outflow by the root of a level that runs empty is steep, and not stiff.
 #[test]
 fn what_is_steep_at_one_place_stays_explicit() {
-    let adaptive = (Integrator::Adaptive, TOLERANCE);
+    let adaptive = (Integrator::Adaptive, Stepping::default().tolerance);
     let (_, taken) = carried(adaptive, [1.0], (50.0, 100), |t, x, dx| {
         let pump = if (t / 10.0) as usize == 2 { 0.8 } else { 0.0 };
         dx[0] = pump - 0.5 * x[0].max(0.0).sqrt();

@@ -3,9 +3,11 @@
 //! A condition that is false where a stretch begins and true at its end is located on it by repeating the step to a part of the stretch: the
 //! place then is as smooth a function of states and parameters as the step is. The rest of the stretch is done from there.
 
+use super::Now;
 use super::event::Event;
-use super::path::{Path, Stretch, limited};
-use super::{Integrator, Now};
+use super::limits::limited;
+use super::path::{Path, Stretch};
+use super::rule::Integrator;
 use crate::math::ascending;
 use crate::twin::Interval;
 

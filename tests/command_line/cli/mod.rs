@@ -465,6 +465,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
     check("twin = 'tanks'\nsamples = 3\n", &["line 2", "unknown key"]);
     for (key, parts) in [
         ("substeps = 0", ["substeps = 0", "between 1 and 1000"]),
+        ("tolerance = 1e-5", ["tolerance", "steps of one length"]),
         ("substeps = 1001", ["substeps = 1001", "between 1 and 1000"]),
         ("substeps = 1e9", ["line 3", "floating point"]),
         (
