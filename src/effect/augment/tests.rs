@@ -152,6 +152,43 @@ fn a_delay_holds_events_back() {
     }
 }
 
+/// Doses come from nowhere before the first row, and all of each arrives, on even and uneven rows.
+#[test]
+fn actuators_pass_doses_on() {
+    let text = "[parameters]\nk = { prior = [0.1, 2.0] }\n[states]\nx = { rate = \"dose - 0*k\", start = 0.0 }\n\
+                [inputs]\ndose = { hold = \"impulse\" }\n[outputs]\ny = { value = \"x\", noise = 0.05 }";
+    let base = Twin::from(Arc::new(Equations::parse(text).unwrap()));
+    let even: Vec<f64> = (0..40).map(f64::from).collect();
+    let uneven: Vec<f64> = (0..40)
+        .map(|k| [0.0, 1.0, 1.3][k % 3] + (k / 3 * 2) as f64)
+        .collect();
+    let at = |effect: (&str, &str), m: &[f64], times: &[f64], row: usize| {
+        let effect = Catalogue::default().effect(effect.0, effect.1).unwrap();
+        let twin = augment_late(base.clone(), vec![effect]).unwrap();
+        let doses = Signal::from_shape_fn((40, 1), |(k, _)| if k == row { 8.0 } else { 0.0 });
+        let drive = Drive::with_times(times, doses).unwrap();
+        twin.free_run(&[&[0.2], m].concat(), &drive).unwrap()
+    };
+    for row in [0, 5] {
+        for effect in [("actuator-delay", "actuator"), ("sensor-delay", "sensor")] {
+            for times in [&even, &uneven] {
+                let run = at(effect, &[2.25], times, row);
+                let arrives = times[row] + 2.25;
+                for (y, t) in run.iter().zip(times) {
+                    let expected = match t - arrives {
+                        late if late > 1.0 => 8.0,
+                        late if late < -1.0 => 0.0,
+                        _ => *y,
+                    };
+                    assert!((y - expected).abs() < 1e-6, "{effect:?} {row}, {t} s: {y}");
+                }
+            }
+        }
+        let run = at(("actuator-lag", "actuator"), &[1.5], &even, row);
+        assert!((run[[39, 0]] - 8.0).abs() < 1e-6, "{row}: {run}");
+    }
+}
+
 /// A step of a parameter within a sample of adaptive steps acts at its time: y = t, and half of what is behind it more.
 #[test]
 fn a_step_of_a_parameter_acts_at_its_time() {

@@ -132,7 +132,7 @@ impl ComposedBlackBox {
         match part {
             TwinPart::Law(part) => match &part.law {
                 Law::Actuator(law) => {
-                    return inner(theta, &part.act(law.as_ref(), theta, drive)?);
+                    return inner(theta, &part.act(law.as_ref(), theta, (drive, false))?);
                 }
                 Law::Parameter(law) => {
                     return self.followed(inside, (part, law.as_ref()), theta, (drive, noise));
@@ -170,7 +170,7 @@ impl ComposedBlackBox {
                 }
                 match &part.law {
                     Law::Sensor(law) | Law::Reading(law) => {
-                        part.pass(law.as_ref(), theta, drive, &mut outputs.signal);
+                        part.pass(law.as_ref(), theta, drive, (&mut outputs.signal, false));
                     }
                     Law::MeasurementNoise(law) => {
                         let source = format!("sensor-noise/{}", part.target);

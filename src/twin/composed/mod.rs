@@ -209,6 +209,11 @@ impl Composed {
         self.parts.outline.holds(self.stepping().hold)
     }
 
+    /// Returns whether an input is an amount, given at its row.
+    pub(super) fn is_amount(&self, input: usize) -> bool {
+        self.holds().get(input) == Some(&Hold::Impulse)
+    }
+
     /// Returns buffers for its motion.
     pub(crate) fn workspace(&self) -> Workspace {
         let rule = (self.integrator(), self.stepping());

@@ -210,7 +210,10 @@ impl Composed {
         if self.parts.acts.in_memories {
             self.resolved(now, |now| {
                 for (added, _, follows) in self.parts.memories() {
-                    let value = self.seen(follows.of, now, x);
+                    let value = match follows.of {
+                        Seen::Input(input) if self.is_amount(input) => 0.0,
+                        of => self.seen(of, now, x),
+                    };
                     follows.by.begin(value, &mut x[added.states.clone()]);
                 }
             });
@@ -298,11 +301,17 @@ impl Composed {
             let before = acting.as_ref().unwrap_or(drive);
             acting = Some(match &added.part {
                 TwinPart::Law(part) => match &part.law {
-                    Law::Actuator(law) => part.act(law.as_ref(), &theta, before)?,
+                    Law::Actuator(law) => {
+                        part.act(law.as_ref(), &theta, (before, self.is_amount(part.target)))?
+                    }
                     _ => continue,
                 },
-                TwinPart::Late(_) => (before.late(self.parts.delay(added.delays, &theta)))
-                    .map_err(SimulationError::of)?,
+                TwinPart::Late(_) => {
+                    let delay = self.parts.delay(added.delays, &theta);
+                    let begun = self.begins().unwrap_or(drive.first_time());
+                    let late = before.late(delay, (begun, |input| self.is_amount(input)));
+                    late.map_err(SimulationError::of)?
+                }
                 _ => continue,
             });
         }
@@ -321,19 +330,25 @@ impl LawPart {
         }
     }
 
-    /// Passes its channel of a whole signal through its law.
+    /// Passes its channel of a whole signal through its law, amounts or what goes on between rows: of amounts there were none before the first.
     pub(super) fn pass(
         &self,
         law: &dyn SignalChange,
         theta: &[f64],
         drive: &Drive,
-        signal: &mut Signal,
+        (signal, is_amount): (&mut Signal, bool),
     ) {
-        if self.is_dead_time && !drive.is_uniform() {
-            let late = drive.delayed(signal.column(self.target), self.m(theta)[0]);
+        let of = signal.column(self.target);
+        let late = match (self.is_dead_time, is_amount) {
+            (true, true) => Some(drive.delayed_amounts(of, (self.m(theta)[0], f64::NEG_INFINITY))),
+            (true, false) if !drive.is_uniform() => Some(drive.delayed(of, self.m(theta)[0])),
+            _ => None,
+        };
+        if let Some(late) = late {
             return signal.column_mut(self.target).assign(&late);
         }
-        let mut memory = vec![signal[[0, self.target]]; self.memory];
+        let first = if is_amount { 0.0 } else { of[0] };
+        let mut memory = vec![first; self.memory];
         let on = LawPlace {
             target: 0,
             other: None,
@@ -355,15 +370,15 @@ impl LawPart {
         }
     }
 
-    /// Returns the drive behind its law.
+    /// Returns the drive behind its law, which acts on amounts or on what goes on between rows.
     pub(super) fn act(
         &self,
         law: &dyn SignalChange,
         theta: &[f64],
-        drive: &Drive,
+        (drive, is_amount): (&Drive, bool),
     ) -> Result<Drive, SimulationError> {
         let mut inputs = drive.inputs().clone();
-        self.pass(law, theta, drive, &mut inputs);
+        self.pass(law, theta, drive, (&mut inputs, is_amount));
         drive.with_inputs(inputs).map_err(|error| match error {
             RecordError::NotFinite { sample, .. } => SimulationError::Diverged {
                 at: drive.time(sample),
