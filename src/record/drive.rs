@@ -209,19 +209,11 @@ impl Drive {
         })
     }
 
-    /// The same inputs later by so many seconds, linear between samples; the first ones before the start, and nothing of those that are amounts.
-    /// What begins at a time keeps the amounts that it is given while it waits for the delay.
-    pub(crate) fn late(
-        &self,
-        delay: f64,
-        (begun, is_amount): (f64, impl Fn(usize) -> bool),
-    ) -> Result<Self, RecordError> {
+    /// The same inputs later by so many seconds, linear between samples; the first ones before the start.
+    pub(crate) fn late(&self, delay: f64) -> Result<Self, RecordError> {
         let mut inputs = self.inputs.as_ref().clone();
-        for (j, mut input) in inputs.columns_mut().into_iter().enumerate() {
-            let late = match is_amount(j) {
-                true => self.delayed_amounts(input.view(), (delay, begun)),
-                false => self.delayed(input.view(), delay),
-            };
+        for mut input in inputs.columns_mut() {
+            let late = self.delayed(input.view(), delay);
             input.assign(&late);
         }
         self.with_inputs(inputs)
@@ -235,30 +227,24 @@ impl Drive {
     }
 
     /// Amounts at these times, later by so many seconds: one that falls between two times is shared by both, more of it at the nearer one, so that
-    /// none is lost but behind the last. The earlier one has all of those that are given no later than `whole`, on the record's own clock.
-    pub(crate) fn delayed_amounts(
-        &self,
-        amounts: ArrayView1<'_, f64>,
-        (delay, whole): (f64, f64),
-    ) -> Array1<f64> {
-        let times: Vec<f64> = (0..self.samples()).map(|k| self.own_time(k)).collect();
+    /// none is lost but behind the last.
+    pub(crate) fn delayed_amounts(&self, amounts: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
+        let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
         // An amount is told at each reading of its time, and is given once.
         let last_of = |k: usize| (k..).find(|k| !self.is_repeated(*k)).unwrap_or(k);
         let mut late = Array1::zeros(times.len());
         for (k, amount) in amounts.iter().enumerate() {
-            let t = times[k] + delay;
-            let after = times.partition_point(|time| *time <= t);
             if *amount == 0.0 || self.is_repeated(k) {
                 continue;
             }
+            let t = times[k] + delay;
+            let after = times.partition_point(|time| *time <= t);
             let before = after - 1;
-            let share = match times.get(after) {
-                _ if times[k] <= whole || t == times[before] => 0.0,
-                Some(next) => (t - times[before]) / (next - times[before]),
-                None => continue,
-            };
-            late[before] += (1.0 - share) * amount;
-            if share > 0.0 {
+            let share = (t - times[before]) / self.step(before);
+            if share < 1.0 {
+                late[before] += (1.0 - share) * amount;
+            }
+            if share > 0.0 && after < times.len() {
                 late[last_of(after)] += share * amount;
             }
         }
@@ -595,19 +581,11 @@ mod tests {
         let error = Drive::with_times(&times, inputs).unwrap_err().to_string();
         let expected = "input 1 is 9, and 3.5 in the row before, which has the same time;";
         assert!(error.starts_with(expected), "{error}");
-        let late = drive.late(0.2, (0.0, |_| false)).unwrap();
+        let late = drive.late(0.2).unwrap();
         assert!(late.inputs().iter().all(|u| u.is_finite()));
         // A dose of 8 at 3 s, 0.75 s later: half of it at 3.5 s, half at 4 s.
-        let dose = Signal::from_shape_fn((6, 1), |(k, _)| if k < 2 { 8.0 } else { 0.0 });
-        let given = drive.with_inputs(dose).unwrap();
-        // All of it at the row before where the twin begins with it.
-        for (begun, expected) in [
-            (0.0, [0.0, 0.0, 4.0, 4.0, 4.0, 4.0]),
-            (3.0, [0.0, 0.0, 8.0, 8.0, 8.0, 0.0]),
-        ] {
-            let late = given.late(0.75, (begun, |_| true)).unwrap();
-            assert_eq!(late.inputs().as_slice(), Some(&expected[..]));
-        }
+        let late = drive.delayed_amounts(ndarray::aview1(&[8.0, 8.0, 0.0, 0.0, 0.0, 0.0]), 0.75);
+        assert_eq!(late.to_vec(), [0.0, 0.0, 4.0, 4.0, 4.0, 4.0]);
     }
 
     #[test]

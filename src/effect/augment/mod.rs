@@ -47,7 +47,7 @@ pub fn augment(base: impl Into<Twin>, effects: Vec<Effect>) -> Result<Twin, Twin
 
 /// Adds effects as [`augment`] does; a delay of the only sensor makes the whole twin late: its states stand still until then, its inputs and
 /// its time are those of before. A delay of several samples is the same to the last bits. One between samples interpolates inputs in
-/// place of outputs, which would take noise out of these, as a lag does.
+/// place of outputs, which would take noise out of these, as a lag does. Of a twin that is given doses, outputs are.
 pub(crate) fn augment_late(base: Twin, effects: Vec<Effect>) -> Result<Twin, TwinError> {
     augmented(base, effects, true)
 }
@@ -69,7 +69,9 @@ fn augmented(base: Twin, effects: Vec<Effect>, may_be_late: bool) -> Result<Twin
     }
     // Along a signal, in the order of the library.
     placed.sort_by_key(|(effect, _)| effect.kind().position());
-    let may_be_late = may_be_late && signals.outputs.len() == 1 && outline.is_some();
+    // What waits for its delay would miss a dose.
+    let has_doses = base.doses().contains(&true);
+    let may_be_late = may_be_late && signals.outputs.len() == 1 && outline.is_some() && !has_doses;
     let is_late = |effect: &Effect| {
         may_be_late && effect.kind().is_dead_time() && matches!(effect.law(), Law::Sensor(_))
     };

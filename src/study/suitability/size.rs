@@ -2,7 +2,7 @@
 
 use super::limits::LIMITS;
 use super::{or_pass, present, text, with_unit};
-use crate::math::{deviation, ends, largest, median};
+use crate::math::{deviation, ends, is_constant, largest, median};
 use crate::record::{Drive, Record, RecordError, Signal};
 use crate::study::Study;
 use crate::twin::conformance::Finding;
@@ -91,7 +91,11 @@ pub(super) fn check_outputs(
         return (vec![Finding::warning("scale", message)], factors);
     }
     for (j, output) in outputs.iter().enumerate() {
-        let own = deviation(&present(record.outputs(), j).1);
+        let values = present(record.outputs(), j).1;
+        let own = match is_constant(&values) {
+            true => 0.0,
+            false => deviation(&values),
+        };
         let sizes = runs.iter().map(|run| deviation(&run.column(j).to_vec()));
         let sizes: Vec<f64> = sizes.collect();
         let (low, high) = ends(&sizes);

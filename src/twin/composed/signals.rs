@@ -306,12 +306,8 @@ impl Composed {
                     }
                     _ => continue,
                 },
-                TwinPart::Late(_) => {
-                    let delay = self.parts.delay(added.delays, &theta);
-                    let begun = self.begins().unwrap_or(drive.first_time());
-                    let late = before.late(delay, (begun, |input| self.is_amount(input)));
-                    late.map_err(SimulationError::of)?
-                }
+                TwinPart::Late(_) => (before.late(self.parts.delay(added.delays, &theta)))
+                    .map_err(SimulationError::of)?,
                 _ => continue,
             });
         }
@@ -340,7 +336,7 @@ impl LawPart {
     ) {
         let of = signal.column(self.target);
         let late = match (self.is_dead_time, is_amount) {
-            (true, true) => Some(drive.delayed_amounts(of, (self.m(theta)[0], f64::NEG_INFINITY))),
+            (true, true) => Some(drive.delayed_amounts(of, self.m(theta)[0])),
             (true, false) if !drive.is_uniform() => Some(drive.delayed(of, self.m(theta)[0])),
             _ => None,
         };

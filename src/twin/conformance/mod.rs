@@ -139,10 +139,12 @@ pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let other = twin.simulate(&setting.centre, drive, Noise::new(seed, "check", 1));
     let spread = other.map_or(0.0, |other| rms(&first, &other));
     findings.push(Finding::of("finite", setting.finite()));
-    findings.push(Finding::of("repeatable", setting.repeatable(&first)));
+    let repeatable = Finding::of("repeatable", setting.repeatable(&first));
+    let repeats = repeatable.severity == Severity::Pass;
+    findings.push(repeatable);
     findings.push(Finding::of("noise", noisy(spread)));
-    // A study may hold all parameters.
-    if !setting.space.is_empty() {
+    // A study may hold all parameters; runs that do not repeat say nothing of their changes.
+    if repeats && !setting.space.is_empty() {
         findings.push(Finding::of("paired", setting.paired(&first, spread)));
         findings.push(Finding::of("identifiable", setting.identifiable(spread)));
     }

@@ -111,9 +111,6 @@ impl Between<'_> {
             return;
         }
         let (mut with, mut without) = (vec![0.0; x.len()], vec![0.0; x.len()]);
-        // A twin that waits for its delay is given them, too.
-        let begun = f64::NEG_INFINITY;
-        let now = &Now { begun, ..*now };
         drift(now, x, &mut with);
         inputs.copy_from_slice(now.u);
         remove_amounts(inputs, self.holds);

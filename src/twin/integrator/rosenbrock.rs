@@ -60,7 +60,7 @@ const OF_STEP: f64 = 1e-5;
 pub(super) struct Rosenbrock {
     increments: [Vec<f64>; 6],
     stage: Vec<f64>,
-    /// Rates where the step begins, their change with time, and those of a stage.
+    /// Rates where the step begins; their change with time, and those of a stage. Before, the latter two are those one and two differences away.
     rates: [Vec<f64>; 3],
 }
 
@@ -134,13 +134,14 @@ impl Rosenbrock {
         let mut matrices = vec![DMatrix::zeros(n, n); x.len() / n];
         for j in 0..n {
             for at in (0..x.len()).step_by(n) {
-                let (x, rate) = (x[at + j], first[at + j]);
-                let size = x.abs().max(sizes[j]).max((h * rate).abs());
+                let (value, rate) = (x[at + j], first[at + j]);
+                let size = value.abs().max(sizes[j]).max((h * rate).abs());
                 let step = HALF_DIGITS * size.max(f64::MIN_POSITIVE.sqrt());
-                stage[at + j] += path.side(j, (x, step), rate) * step;
+                stage[at + j] += path.side(j, (value, 2.0 * step), rate) * step;
             }
             path.rates(of, 0.0, stage, near);
-            // What is as steep as a jump over the step may be one, of which a second difference behind the first shows nothing.
+            // What a difference changes by its own size over the step is stiff, or a jump: a second difference, from the end of the first, has no
+            // jump in it.
             let is_steep = (0..x.len()).any(|i| {
                 let size = x[i].abs().max(sizes[i % n]);
                 h * (near[i] - first[i]).abs() > HALF_DIGITS * size
@@ -159,7 +160,7 @@ impl Rosenbrock {
                 if is_steep {
                     difference *= 0.5;
                     // A state that is pushed back behind a jump is held by it.
-                    let is_held = near[at + j] * first[at + j] < 0.0;
+                    let is_held = near[at + j] * difference < 0.0;
                     if !is_held {
                         (from, to) = (&near[..], &far[..]);
                     }
