@@ -111,7 +111,7 @@ fn inputs_lie_on_lines() {
         run(Integrator::RungeKutta4, 2, Hold::Nearest),
         [0.0, 0.05, 0.25, 0.5],
     );
-    // Of an odd number of substeps, the middle one has the mean.
+    // Of an odd number of substeps, the middle one is two halves.
     near(
         run(Integrator::Euler, 1, Hold::Nearest),
         [0.0, 0.05, 0.25, 0.5],

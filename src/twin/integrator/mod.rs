@@ -16,7 +16,6 @@ mod watch;
 mod workspace;
 
 use serde::{Deserialize, Serialize};
-use std::cmp::Ordering;
 
 pub use event::Event;
 pub(super) use limits::felt;
@@ -140,8 +139,8 @@ pub enum Hold {
     Zero,
     /// On the line from one sample to the next; the last is held.
     Linear,
-    /// Held at the value of the nearest sample: what a smooth input does that was sampled, and not held. With an odd number of substeps, the
-    /// middle one has the mean of both; the last is held.
+    /// Held at the value of the nearest sample: what a smooth input does that was sampled, and not held. Of an odd number of substeps, the middle
+    /// one is two of half its length; the last is held.
     Nearest,
     /// On the natural cubic spline through all samples: a smooth input that was sampled several times a period. The last is held.
     Spline,
@@ -172,11 +171,7 @@ impl Hold {
         match self {
             Self::Zero | Self::Impulse => 0.0,
             Self::Linear | Self::Spline => at,
-            Self::Nearest => match middle.total_cmp(&0.5) {
-                Ordering::Less => 0.0,
-                Ordering::Equal => 0.5,
-                Ordering::Greater => 1.0,
-            },
+            Self::Nearest => f64::from(middle >= 0.5),
         }
     }
 }

@@ -488,6 +488,37 @@ fn amounts_are_added_at_their_rows() {
     }
 }
 
+/// An input that jumps half-way has no mean there: ẋ = u² from 1 to −3 over 0.2 s.
+#[test]
+fn no_step_goes_over_the_jump_of_an_input() {
+    for rule in [
+        Integrator::Euler,
+        Integrator::RungeKutta4,
+        Integrator::Adaptive,
+    ] {
+        for substeps in [1, 2, 3, 5] {
+            let stepping = Stepping {
+                substeps,
+                ..Stepping::default()
+            };
+            let limits = [Interval::EVERYTHING];
+            let mut work = Workspace::of(&[Hold::Nearest], &limits, (rule, stepping), &[]);
+            let between = Between {
+                next: &[-3.0],
+                holds: &[Hold::Nearest],
+                bends: &[],
+            };
+            let now = Now {
+                between: Some(between),
+                ..Now::new(0.0, 0.2, &[1.0], &[])
+            };
+            let mut x = [0.0];
+            work.carry(1, &now, &mut x, |now, _, dx| dx[0] = now.u[0].powi(2));
+            assert!((x[0] - 1.0).abs() < 1e-12, "{rule:?}, {substeps}: {x:?}");
+        }
+    }
+}
+
 /// A fall through so many thresholds, which counts its rates.
 struct Thresholds {
     number: u32,

@@ -246,16 +246,24 @@ impl Refined {
             Some(limits) => limits.rates(drift, now, x, dx),
             None => drift(now, x, dx),
         };
-        for i in 0..m {
-            if i > 0 {
+        let jumps_half_way = (now.between)
+            .is_some_and(|between| m % 2 == 1 && between.holds.contains(&Hold::Nearest));
+        // In halves of steps; no step goes over a jump of inputs.
+        let mut from = 0;
+        while from < 2 * m {
+            let is_half = jumps_half_way && (from + 1 == m || from == m);
+            let to = from + if is_half { 1 } else { 2 };
+            let [begin, end] = [from, to].map(|halves| 0.5 * halves as f64);
+            if from > 0 {
                 limited(n, x, &self.limits);
             }
+            from = to;
             let sub = Now {
-                t: now.t + i as f64 * h,
-                dt: h,
-                end: match i + 1 == m {
+                t: now.t + begin * h,
+                dt: (end - begin) * h,
+                end: match to == 2 * m {
                     true => now.end,
-                    false => now.t + (i + 1) as f64 * h,
+                    false => now.t + end * h,
                 },
                 ..*now
             };
@@ -265,7 +273,7 @@ impl Refined {
             };
             let inputs = &mut self.inputs;
             rule.step_in_stages(&sub, x, stages, |share, stage, x, dx| {
-                let (at, middle) = (i as f64 + share, i as f64 + 0.5);
+                let (at, middle) = (begin + share * (end - begin), 0.5 * (begin + end));
                 between.inputs_at(at / m as f64, middle / m as f64, now.u, inputs);
                 let stage = Now {
                     u: inputs,
