@@ -226,7 +226,7 @@ impl Drive {
         (0..self.samples()).map(late).collect()
     }
 
-    /// Amounts at these times, later by so many seconds: one that falls between two times is shared by both, more of it at the nearer one, so that
+    /// Amounts at these times, later by so many seconds, 0 at least: one that falls between two times is shared by both, more of it at the nearer one, so that
     /// none is lost but behind the last.
     pub(crate) fn delayed_amounts(&self, amounts: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
         let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
@@ -237,7 +237,7 @@ impl Drive {
             if *amount == 0.0 || self.is_repeated(k) {
                 continue;
             }
-            let t = times[k] + delay;
+            let t = times[k] + delay.max(0.0);
             let after = times.partition_point(|time| *time <= t);
             let before = after - 1;
             let share = (t - times[before]) / self.step(before);
