@@ -226,8 +226,8 @@ impl Drive {
         (0..self.samples()).map(late).collect()
     }
 
-    /// Amounts at these times, later by so many seconds, 0 at least: one that falls between two times is shared by both, more of it at the nearer one, so that
-    /// none is lost but behind the last.
+    /// Amounts at these times, later by so many seconds, 0 at least: one that falls between two times is shared by both, more of it at the nearer
+    /// one, so that none is lost but behind the last.
     pub(crate) fn delayed_amounts(&self, amounts: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
         let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
         // An amount is told at each reading of its time, and is given once.

@@ -236,7 +236,7 @@ pub(super) fn constrain_together(
     let shifts = &points.shifts[..n];
     let (moving, shifted) = points.all.split_at_mut(points.moving * n);
     let pairs = || (shifts.iter().enumerate()).flat_map(|(i, s)| [(i, *s), (i, -s)]);
-    let before = work.stage(n);
+    let before = work.stages().stage(n);
     before.copy_from_slice(&moving[..n]);
     for (x, of) in shifted.chunks_exact_mut(n).zip(pairs()) {
         for (j, x) in x.iter_mut().enumerate() {

@@ -224,8 +224,13 @@ impl Outline {
 
     /// Rule of each input between samples; `usual` without one of its own.
     pub(crate) fn holds(&self, usual: Hold) -> Vec<Hold> {
-        let held = |input: &Quantity| self.held.get(&input.name).copied().unwrap_or(usual);
-        self.inputs.iter().map(held).collect()
+        let inputs = self.inputs.iter();
+        inputs.map(|input| self.hold_of(input, usual)).collect()
+    }
+
+    /// Rule of one input, as [`holds`](Self::holds) has it.
+    pub(super) fn hold_of(&self, input: &Quantity, usual: Hold) -> Hold {
+        self.held.get(&input.name).copied().unwrap_or(usual)
     }
 
     /// Input and output channels.

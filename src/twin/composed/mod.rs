@@ -211,7 +211,8 @@ impl Composed {
 
     /// Returns whether an input is an amount, given at its row.
     pub(super) fn is_amount(&self, input: usize) -> bool {
-        self.holds().get(input) == Some(&Hold::Impulse)
+        let outline = &self.parts.outline;
+        outline.hold_of(&outline.inputs[input], self.stepping().hold) == Hold::Impulse
     }
 
     /// Returns buffers for its motion.

@@ -86,6 +86,11 @@ pub(crate) struct Between<'a> {
 }
 
 impl Between<'_> {
+    /// Returns whether an input jumps half-way.
+    pub fn jumps_half_way(&self) -> bool {
+        self.holds.contains(&Hold::Nearest)
+    }
+
     /// Inputs at a share of the way to the next sample, in a step whose middle is at another.
     pub fn inputs_at(&self, at: f64, middle: f64, u: &[f64], to: &mut [f64]) {
         let rules = self.holds.iter().enumerate();

@@ -1,7 +1,7 @@
 //! The way from one sample to the next: rates at any part of it, with the inputs there.
 
 use super::limits::LimitsOfWay;
-use super::{Hold, Now, Rates};
+use super::{Now, Rates};
 use smallvec::SmallVec;
 
 /// Least share of the way by which rates stay off jumps: no tolerance shows it. A tenth would do.
@@ -168,10 +168,7 @@ pub(super) fn breaks(
     others: impl IntoIterator<Item = f64>,
 ) -> SmallVec<[f64; 4]> {
     let mut all: SmallVec<[f64; 4]> = others.into_iter().collect();
-    if now
-        .between
-        .is_some_and(|between| between.holds.contains(&Hold::Nearest))
-    {
+    if now.between.is_some_and(|between| between.jumps_half_way()) {
         all.push(0.5);
     }
     all.retain(|share| *share > 0.0 && *share < 1.0);

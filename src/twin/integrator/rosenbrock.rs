@@ -154,17 +154,15 @@ impl Rosenbrock {
             }
             for (p, matrix) in matrices.iter_mut().enumerate() {
                 let at = p * n;
-                let mut difference = stage[at + j] - x[at + j];
+                let steps = if is_steep { 2.0 } else { 1.0 };
+                let difference = (stage[at + j] - x[at + j]) / steps;
                 stage[at + j] = x[at + j];
-                let (mut from, mut to) = (&first[..], &near[..]);
-                if is_steep {
-                    difference *= 0.5;
-                    // A state that is pushed back behind a jump is held by it.
-                    let is_held = near[at + j] * difference < 0.0;
-                    if !is_held {
-                        (from, to) = (&near[..], &far[..]);
-                    }
-                }
+                // A state that is pushed back behind a jump is held by it.
+                let is_held = near[at + j] * difference < 0.0;
+                let (from, to) = match is_steep && !is_held {
+                    true => (&near[..], &far[..]),
+                    false => (&first[..], &near[..]),
+                };
                 for i in 0..n {
                     matrix[(i, j)] = (from[at + i] - to[at + i]) / difference;
                 }

@@ -74,7 +74,7 @@ impl StepBuffers {
     }
 
     /// A buffer for `states` states.
-    pub(super) fn stage(&mut self, states: usize) -> &mut [f64] {
+    pub(in crate::twin) fn stage(&mut self, states: usize) -> &mut [f64] {
         grown(&mut self.stage, states)
     }
 }

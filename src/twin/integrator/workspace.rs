@@ -209,11 +209,6 @@ impl Workspace {
             }
         }
     }
-
-    /// A buffer for `states` states.
-    pub(in crate::twin) fn stage(&mut self, states: usize) -> &mut [f64] {
-        self.stages.stage(states)
-    }
 }
 
 impl Refined {
@@ -246,12 +241,11 @@ impl Refined {
             Some(limits) => limits.rates(drift, now, x, dx),
             None => drift(now, x, dx),
         };
-        let jumps_half_way = (now.between)
-            .is_some_and(|between| m % 2 == 1 && between.holds.contains(&Hold::Nearest));
+        let is_split = m % 2 == 1 && now.between.is_some_and(|between| between.jumps_half_way());
         // In halves of steps; no step goes over a jump of inputs.
         let mut from = 0;
         while from < 2 * m {
-            let is_half = jumps_half_way && (from + 1 == m || from == m);
+            let is_half = is_split && (from + 1 == m || from == m);
             let to = from + if is_half { 1 } else { 2 };
             let [begin, end] = [from, to].map(|halves| 0.5 * halves as f64);
             if from > 0 {
