@@ -6,6 +6,7 @@ use crate::math::{six_digits, three_digits};
 use crate::record::{Record, RecordReader, column_names};
 use crate::setting::number;
 use crate::storage::reading::is_pipe;
+use crate::study::Study;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -51,6 +52,15 @@ pub(super) fn read(
     }
     let validation = validation.and_then(|_| records.pop());
     Ok((records, validation))
+}
+
+/// Warns of records whose times seem to be in another unit: a fit of them may take long.
+pub(super) fn warn_of_times(study: &Study, paths: &[PathBuf], records: &[Record], seed: u64) {
+    for (path, record) in paths.iter().zip(records) {
+        if let Some(message) = study.mistaken_time(record, seed) {
+            warn(&format!("{}: {message}", path.display()));
+        }
+    }
 }
 
 /// Refuses a place for a record by a name that its reader would take for another form.

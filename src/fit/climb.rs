@@ -8,6 +8,7 @@ use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::fit::solver::{LocalModel, Objective, Solver};
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
+use crate::math::descending;
 use crate::parallel::try_each;
 use nalgebra::{DMatrix, DVector};
 
@@ -45,6 +46,34 @@ impl Fitted {
     }
 }
 
+/// Place at which a climb has ended, with the derivatives that it knows there.
+#[derive(Debug, Clone)]
+pub(crate) struct Reached {
+    /// Full θ.
+    pub theta: Vec<f64>,
+    /// Objective of the fit: likelihood and all priors.
+    pub objective: f64,
+    model: Option<LocalModel>,
+}
+
+impl Reached {
+    /// The fit, with its derivatives; `None` where there are none.
+    pub fn fitted(self, problem: &Problem) -> Result<Option<Fitted>, FilterError> {
+        let model = match self.model {
+            Some(model) => Some(model),
+            None => recoverable(model(problem, &self.theta, None))?,
+        };
+        let finite = model.filter(|model| model.cost.is_finite());
+        Ok(finite.map(|model| Fitted {
+            log_likelihood: -model.cost - problem.log_prior(&self.theta, true),
+            objective: -model.cost,
+            gradient: -model.gradient,
+            information: model.information,
+            theta: self.theta,
+        }))
+    }
+}
+
 /// Damped Fisher scoring from one start, within the bounds; `None` where the filter does not work at the start.
 ///
 /// The information holds that of the weak prior, too.
@@ -53,6 +82,27 @@ pub(crate) fn climb(
     start: &[f64],
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
+    match ended(problem, start, iterations, true)? {
+        Some(end) => end.fitted(problem),
+        None => Ok(None),
+    }
+}
+
+/// As [`climb`], for those who ask for the place alone: derivatives there would cost as much as ten likelihoods.
+pub(crate) fn reach(
+    problem: &Problem,
+    start: &[f64],
+    iterations: usize,
+) -> Result<Option<Reached>, FilterError> {
+    ended(problem, start, iterations, false)
+}
+
+fn ended(
+    problem: &Problem,
+    start: &[f64],
+    iterations: usize,
+    models_end: bool,
+) -> Result<Option<Reached>, FilterError> {
     let c = &problem.coordinates;
     let solver = Solver {
         lower: c.lower(),
@@ -66,20 +116,14 @@ pub(crate) fn climb(
         gain: problem.done(),
         relative_gain: 0.0,
         least_step: BUDGET.least_step,
-        models_end: true,
+        models_end,
     };
     let start = DVector::from_vec(c.of(&problem.clamp(start)));
     let end = recoverable(solver.minimise(&LogPosterior(problem), &start))?;
-    Ok(end.and_then(|end| {
-        let theta = c.theta(end.x.as_slice());
-        let model = end.model?;
-        Some(Fitted {
-            log_likelihood: -model.cost - problem.log_prior(&theta, true),
-            objective: -model.cost,
-            gradient: -model.gradient,
-            information: model.information,
-            theta,
-        })
+    Ok(end.map(|end| Reached {
+        theta: c.theta(end.x.as_slice()),
+        objective: -end.cost,
+        model: end.model,
     }))
 }
 
@@ -199,7 +243,7 @@ pub(crate) fn settling(
     let has_shape = (0..problem.axes.len()).any(is_shape);
     let held = has_shape.then(|| problem.holding(is_shape));
     move |start| match &held {
-        Some(held) => Ok(climb(held, &start, iterations)?.map_or(start, |settled| settled.theta)),
+        Some(held) => Ok(reach(held, &start, iterations)?.map_or(start, |settled| settled.theta)),
         None => Ok(start),
     }
 }
@@ -210,13 +254,24 @@ pub(crate) fn fit(
     starts: &[Vec<f64>],
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
-    let mut best: Option<Fitted> = None;
-    for start in starts {
-        if let Some(fitted) = climb(problem, start, iterations)?
-            && best.as_ref().is_none_or(|b| fitted.objective > b.objective)
-        {
-            best = Some(fitted);
+    for end in reached(problem, starts, iterations)? {
+        if let Some(fitted) = end.fitted(problem)? {
+            return Ok(Some(fitted));
         }
     }
-    Ok(best)
+    Ok(None)
+}
+
+/// Places that climbs from several starts reach, best first; of equal ones that of the first start is first.
+pub(crate) fn reached(
+    problem: &Problem,
+    starts: &[Vec<f64>],
+    iterations: usize,
+) -> Result<Vec<Reached>, FilterError> {
+    let mut ends = vec![];
+    for start in starts {
+        ends.extend(reach(problem, start, iterations)?);
+    }
+    descending(&mut ends, |end| end.objective);
+    Ok(ends)
 }

@@ -2,7 +2,7 @@
 //!
 //! Rules are compared with a step that is fine: with a coarse one, the error of one rule may cancel that of the step.
 
-use super::climb::{Fitted, climb};
+use super::climb::{Fitted, reach};
 use super::problem::Problem;
 use super::reference::Reference;
 use super::starts::growing::sketch;
@@ -73,7 +73,7 @@ pub(crate) fn other_hold(
         }) else {
             return Ok(None);
         };
-        Ok(climb(&finer, theta, ITERATIONS)?.map(|fitted| fitted.objective))
+        Ok(reach(&finer, theta, ITERATIONS)?.map(|end| end.objective))
     };
     let least = carried(own.hold)?.map_or(fitted.objective, |own| own.max(fitted.objective));
     let mut best: Option<OtherHold> = None;

@@ -11,7 +11,7 @@
 //! Source: A. Raue et al., *Structural and practical identifiability analysis of partially observed dynamical models by exploiting the profile
 //! likelihood*, Bioinformatics 25 (2009) 1923–1929.
 
-use super::climb::{Fitted, climb};
+use super::climb::{Fitted, climb, reach};
 use super::problem::Problem;
 use crate::fit::budget::BUDGET;
 use crate::fit::budget::ITERATIONS;
@@ -190,7 +190,9 @@ impl Profiled {
         let mut step = usual.unwrap_or(self.problem.axes[j].longest) * (2.0 * depth).sqrt()
             / BUDGET.profile_parts;
         let mut points: Vec<ProfilePoint> = vec![];
-        let (mut before, mut here) = (start.clone(), start);
+        let answers = self.answers(j);
+        let before = start.iter().zip(&answers).map(|(phi, answer)| phi - answer);
+        let (mut before, mut here) = (before.collect::<Vec<f64>>(), start);
         while points.len() < BUDGET.most_profile_fits && here[j] != bound {
             let next = here[j] + sign * step;
             let next = if sign * (next - bound) >= 0.0 {
@@ -214,6 +216,23 @@ impl Profiled {
         }
         self.fill(&held, j, &mut points)?;
         Ok(points)
+    }
+
+    /// Rates at which the best of all other entries follow entry j at the top; 0 where the likelihood does not tell.
+    fn answers(&self, j: usize) -> Vec<f64> {
+        let axes = &self.problem.axes;
+        let is_other = |i: &usize| *i != j && !axes[*i].held;
+        let others: Vec<usize> = (0..axes.len()).filter(is_other).collect();
+        let rows = self.top.information.select_rows(&others);
+        let mut answers = vec![0.0; axes.len()];
+        if let Some(root) = rows.select_columns(&others).cholesky() {
+            let all = root.solve(&rows.column(j));
+            for (&i, answer) in others.iter().zip(all.iter()) {
+                answers[i] = -answer;
+            }
+        }
+        answers[j] = 1.0;
+        answers
     }
 
     /// Puts points into the widest gaps between the top and the end.
@@ -255,7 +274,7 @@ impl Profiled {
                 break;
             }
             let at = crossing(j, [&inside, &beyond], depth);
-            let Some(point) = self.fitted(held, (j, at), [&inside.phi, &inside.phi])? else {
+            let Some(point) = self.fitted(held, (j, at), [&inside.phi, &beyond.phi])? else {
                 break;
             };
             let last = points.len() - 1;
@@ -290,7 +309,7 @@ impl Profiled {
         for (phi, (low, high)) in phi.iter_mut().zip(ends) {
             *phi = phi.max(*low).min(*high);
         }
-        let found = climb(held, &c.theta(&phi), ITERATIONS)?;
+        let found = reach(held, &c.theta(&phi), ITERATIONS)?;
         Ok(found.map(|fitted| ProfilePoint {
             phi: c.of(&fitted.theta),
             drop: self.top.objective - fitted.objective,

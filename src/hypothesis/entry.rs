@@ -61,6 +61,14 @@ impl Placed {
     }
 }
 
+impl Placed {
+    /// Returns whether it has one value for all states of a moment.
+    fn is_of_the_moment(&self) -> bool {
+        let is_told = matches!(self.function.of, Of::Time | Of::Input(_));
+        is_told && self.function.trace.is_none()
+    }
+}
+
 impl RateChange for Placed {
     fn push(
         &self,
@@ -70,9 +78,10 @@ impl RateChange for Placed {
         (at, x): (Layout, &[f64]),
         dx: &mut [f64],
     ) {
+        let same = (self.is_of_the_moment()).then(|| self.value(m, now, x, 0.0));
         let points = x.chunks_exact(at.stride);
         for (x, rates) in points.zip(dx.chunks_exact_mut(at.stride)) {
-            rates[on.target] += self.value(m, now, x, 0.0);
+            rates[on.target] += same.unwrap_or_else(|| self.value(m, now, x, 0.0));
         }
     }
 }
@@ -86,9 +95,10 @@ impl SignalChange for Placed {
         (at, x): (Layout, &[f64]),
         (p, y): (usize, &mut [f64]),
     ) {
+        let same = (self.is_of_the_moment()).then(|| self.reading(m, now, x, 0.0));
         for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
             let signal = &mut y[on.target];
-            *signal += self.reading(m, now, x, *signal);
+            *signal += same.unwrap_or_else(|| self.reading(m, now, x, *signal));
         }
     }
 }

@@ -38,6 +38,7 @@ impl Verb for Compare {
             let reader = self.columns.reader(&study);
             let (mut measured, validation) =
                 records::read(reader, &self.records, Some(&self.validation))?;
+            records::warn_of_times(&study, &self.records, &measured, context.seed);
             let Some(validation) = validation else {
                 continue;
             };

@@ -2,7 +2,7 @@
 
 use super::model::{Extended, Model};
 use super::screen::{Beginning, Linear, Promise};
-use crate::fit::climb::{Fitted, climb, fit, settling};
+use crate::fit::climb::{Fitted, Reached, climb, fit, reach, settling};
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
 use crate::fit::spectral_starts;
@@ -11,19 +11,20 @@ use crate::hypothesis::limits::SEARCH;
 use crate::likelihood::kalman::FilterError;
 use crate::parallel::try_found;
 use crate::twin::Noise;
+use std::ops::Range;
 
 /// Shares of the step to the top of the quadratic that a function's fit may begin at.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.0];
 
 /// Effort of a fit.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct Effort {
-    /// Starts of the term.
-    pub starts: usize,
+    /// Starts of the term, by their places in its promise.
+    pub starts: Range<usize>,
     pub iterations: usize,
 }
 
-/// Fits a promise beside a model from its best starts, with θ as it answers them and with those given; `None` where it works at none.
+/// Fits a promise beside a model from these of its starts, with θ as it answers them and with those given; `None` where it works at none.
 pub(crate) fn fit_promise(
     model: &Model,
     promise: &Promise,
@@ -31,15 +32,16 @@ pub(crate) fn fit_promise(
     effort: Effort,
 ) -> Result<Option<Model>, FilterError> {
     let extended = model.extend(&promise.term)?;
-    let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
+    let Range { start, end } = effort.starts;
+    let all = promise.starts.iter().take(end);
     let settled = settling_last(&extended.problem, &extended);
-    let mut from: Vec<Vec<f64>> = (chosen.iter())
+    let mut from: Vec<Vec<f64>> = (all.skip(start))
         .map(|start| {
             let theta = begin(model, &extended, start)?;
             Ok(if start.scales { settled(theta)? } else { theta })
         })
         .collect::<Result<_, FilterError>>()?;
-    if let Some(first) = chosen.first() {
+    if let Some(first) = promise.starts.first() {
         let first = model.beside(&extended, &first.m);
         from.extend(thetas.iter().map(|own| extended.from(own, first.clone())));
     }
@@ -114,7 +116,7 @@ pub(crate) fn anneal(
     loud: &Model,
     promise: &Promise,
     starts: usize,
-) -> Result<Vec<Fitted>, FilterError> {
+) -> Result<Vec<Reached>, FilterError> {
     let held = loud.extend(&promise.term)?;
     let c = &held.problem.coordinates;
     let quiet = (model.problem.coordinates).of(&model.fitted.theta);
@@ -129,11 +131,11 @@ pub(crate) fn anneal(
                     phi[j] = (1.0 - share) * loudest[j] + share * quiet[j];
                 }
             }
-            let Some(fitted) = climb(&held.problem, &c.theta(&phi), SEARCH.held)? else {
+            let Some(end) = reach(&held.problem, &c.theta(&phi), SEARCH.held)? else {
                 return Ok(None);
             };
-            theta.clone_from(&fitted.theta);
-            last = Some(fitted);
+            theta.clone_from(&end.theta);
+            last = Some(end);
         }
         Ok(last)
     })
@@ -143,12 +145,11 @@ pub(crate) fn anneal(
 pub(crate) fn release(
     model: &Model,
     promise: &Promise,
-    begun: &[Fitted],
+    begun: &[Reached],
 ) -> Result<Option<Model>, FilterError> {
     let free = model.extend(&promise.term)?;
-    let released = |begun: &Fitted| climb(&free.problem, &begun.theta, SEARCH.released);
-    let fits = try_found(begun, released)?;
-    let best = (fits.into_iter()).reduce(|a, b| if b.objective > a.objective { b } else { a });
+    let from: Vec<Vec<f64>> = begun.iter().map(|end| end.theta.clone()).collect();
+    let best = fit(&free.problem, &from, SEARCH.released)?;
     Ok(best.and_then(|fitted| free.fitted(model.base.clone(), fitted)))
 }
 

@@ -117,7 +117,7 @@ pub(crate) fn listed(
     }
     sort(&mut all);
     let floor = model.log_evidence;
-    fit_on(model, &promises, &mut all)?;
+    fit_on(model, &promises, breadth, &mut all)?;
     sort(&mut all);
     leave_valleys(model, &mut all, floor)?;
     // A filter sees rounding by its first two moments, and may be worse off with it than with louder noise; the values bear its mark
@@ -148,16 +148,19 @@ fn first_fits(
     thetas: &[Vec<f64>],
     breadth: Breadth,
 ) -> Result<Vec<Model>, FilterError> {
-    let chosen: Vec<&Promise> = (promises.iter().take(breadth.listed))
-        .filter(|promise| promise.nats() > breadth.least)
-        .collect();
     let effort = Effort {
-        starts: 2,
+        starts: 0..SEARCH.first_starts,
         iterations: 6,
     };
-    try_found(chosen, |promise| {
-        fit_promise(model, promise, thetas, effort)
+    try_found(first_chosen(promises, breadth), |promise| {
+        fit_promise(model, promise, thetas, effort.clone())
     })
+}
+
+/// Terms that promise most.
+fn first_chosen(promises: &[Promise], breadth: Breadth) -> impl Iterator<Item = &Promise> {
+    let best = promises.iter().take(breadth.listed);
+    best.filter(move |promise| promise.nats() > breadth.least)
 }
 
 /// Fits of all terms from the prior's centre and from unfolded records: beside the twin where it is, the right one may promise nothing.
@@ -191,7 +194,15 @@ fn annealed_fits(
 }
 
 /// Gives those near the best more starts, and carries them on.
-fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Result<(), FilterError> {
+fn fit_on(
+    model: &Model,
+    promises: &[Promise],
+    breadth: Breadth,
+    all: &mut [Explanation],
+) -> Result<(), FilterError> {
+    let has_begun = |promise: &Promise| {
+        first_chosen(promises, breadth).any(|first| std::ptr::eq(first, promise))
+    };
     let floor = model.log_evidence;
     let top = all.first().map_or(floor, |f| f.log_z);
     let is_near = |i: usize, log_z: f64| i < 5 || log_z > top - SEARCH.candidates;
@@ -210,16 +221,25 @@ fn fit_on(model: &Model, promises: &[Promise], all: &mut [Explanation]) -> Resul
             .filter(|theta| own.as_ref() != Some(theta))
             .cloned()
             .collect();
-        let effort = Effort {
-            starts: match found.last().shape() {
-                Some(_) => SEARCH.starts_of_shape,
-                None => 3,
-            },
-            iterations: 12,
+        let most = match found.last().shape() {
+            Some(_) => SEARCH.starts_of_shape,
+            None => 3,
         };
         let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, found.last()));
         let fitted = match promise {
-            Some(promise) => fit_promise(model, promise, &thetas, effort)?,
+            Some(promise) => {
+                // The best of the first starts is carried on.
+                let first = if has_begun(promise) {
+                    SEARCH.first_starts
+                } else {
+                    0
+                };
+                let effort = Effort {
+                    starts: first..most,
+                    iterations: 12,
+                };
+                fit_promise(model, promise, &thetas, effort)?
+            }
             None => None,
         };
         let carried = match &found.model {

@@ -101,7 +101,7 @@ fn disturbances(
     try_each(order.into_iter().enumerate(), |(n, i)| {
         let is_worth = rough[i] > 0.0 || promises[i].nats() > breadth.least;
         let effort = Effort {
-            starts: 2,
+            starts: 0..SEARCH.first_starts,
             iterations: 6,
         };
         let fitted = match n < breadth.functions && is_worth {

@@ -3,7 +3,7 @@
 use super::explanation::Explanation;
 use super::fits::settling_last;
 use super::model::Model;
-use crate::fit::climb::{Fitted, climb, fit};
+use crate::fit::climb::{Reached, climb, reach, reached};
 use crate::hypothesis::limits::{SEARCH, TERM};
 use crate::hypothesis::term::Term;
 use crate::likelihood::kalman::FilterError;
@@ -91,12 +91,12 @@ fn begun_again(
     let from: Vec<Vec<f64>> = (starts.iter())
         .map(|(theta, m)| settled(extended.from(theta, model.beside(&extended, m))))
         .collect::<Result<_, _>>()?;
-    let begun = fit(&own.problem, &from, SEARCH.begun_again)?;
-    let Some(begun) = begun.filter(|begun| begun.objective > own.fitted.objective) else {
+    let begun = reached(&own.problem, &from, SEARCH.begun_again)?;
+    let Some(begun) = (begun.first()).filter(|begun| begun.objective > own.fitted.objective) else {
         return Ok(None);
     };
     let carried = climb(&own.problem, &begun.theta, SEARCH.carried)?;
-    let better = own.refitted(carried.unwrap_or(begun));
+    let better = carried.and_then(|carried| own.refitted(carried));
     Ok(better.map(|m| Explanation {
         terms: m.terms.clone(),
         log_z: found.log_z + m.log_evidence - own.log_evidence,
@@ -115,16 +115,16 @@ fn between(model: &Model, found: &Explanation) -> Result<Option<Start>, FilterEr
     let held = own.problem.holding(|j| j == time);
     let record = &own.problem.records[0];
     let (count, mut theta) = (SEARCH.closer * (TERM.times + 1), own.fitted.theta.clone());
-    let mut best: Option<Fitted> = None;
+    let mut best: Option<Reached> = None;
     for i in 1..count {
         theta[time] = record.drive().dt() * (record.samples() * i) as f64 / count as f64;
-        if let Some(fitted) = climb(&held, &theta, SEARCH.answers)? {
-            theta.clone_from(&fitted.theta);
+        if let Some(end) = reach(&held, &theta, SEARCH.answers)? {
+            theta.clone_from(&end.theta);
             if best
                 .as_ref()
-                .is_none_or(|best| fitted.objective > best.objective)
+                .is_none_or(|best| end.objective > best.objective)
             {
-                best = Some(fitted);
+                best = Some(end);
             }
         }
     }

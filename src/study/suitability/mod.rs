@@ -129,6 +129,17 @@ impl Study {
         })
     }
 
+    /// Returns a sentence about a record whose times seem to be in another unit than seconds.
+    pub(crate) fn mistaken_time(&self, record: &Record, seed: u64) -> Option<String> {
+        let noise = Noise::new(seed, "suitability", 0);
+        let constants = || {
+            let drive = self.drives().ok()?.draw(noise).ok()?;
+            self.time_constants(&self.planned(drive, noise)?)
+        };
+        let (_, message) = time::mistaken_unit(self, record.drive(), constants)?;
+        Some(message)
+    }
+
     /// A record as the plan has them, simulated at the centre of the prior.
     fn planned(&self, drive: Drive, noise: Noise) -> Option<Record> {
         let drive = drive.first(LIMITS.looked_at);

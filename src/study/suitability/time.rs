@@ -17,6 +17,37 @@ const UNITS: [(f64, &str); 6] = [
     (1.0 / 86_400.0, "days"),
 ];
 
+/// Returns the unit that times are in by mistake, so many of which are a second, with a sentence about it; `constants` gives the fastest and the
+/// slowest time constant of the twin, where it can be told.
+pub(super) fn mistaken_unit(
+    study: &Study,
+    drive: &Drive,
+    constants: impl FnOnce() -> Option<(f64, f64)>,
+) -> Option<(f64, String)> {
+    let step = drive.dt();
+    let plan = study.plan()?.step;
+    let like_plan = |unit: f64, near: f64| (step / unit / plan).ln().abs() <= near.ln();
+    let is_like = |near| UNITS.iter().any(|(unit, _)| like_plan(*unit, near));
+    if drive.rows().has_stamps() || !is_like(LIMITS.near_plan) {
+        return None;
+    }
+    let length = drive.time(drive.samples() - 1);
+    let near = match constants() {
+        Some((fast, slow)) if step <= 0.5 * fast && length >= slow => return None,
+        Some(_) => LIMITS.near_plan,
+        None => LIMITS.as_planned,
+    };
+    let mut units = UNITS.into_iter();
+    let (unit, name) = units.find(|(unit, _)| like_plan(*unit, near))?;
+    let message = format!(
+        "a step of {} s, {} s in the study: t seems to be in {name}; {}",
+        text(step),
+        text(plan),
+        conversion(unit)
+    );
+    Some((unit, message))
+}
+
 /// Checks the time grid; also returns how many units of the record's time a second is.
 pub(super) fn check(
     study: &Study,
@@ -24,27 +55,12 @@ pub(super) fn check(
     constants: Option<(f64, f64)>,
 ) -> (Vec<Finding>, f64) {
     let drive = record.drive();
+    if let Some((unit, message)) = mistaken_unit(study, drive, || constants) {
+        return (vec![Finding::warning("time", message)], unit);
+    }
     let step = drive.dt();
     let plan = study.plan().map_or(step, |plan| plan.step);
     let length = drive.time(record.samples() - 1);
-    let fits = |(fast, slow)| step <= 0.5 * fast && length >= slow;
-    let near = match constants {
-        Some(_) => LIMITS.near_plan,
-        None => LIMITS.as_planned,
-    };
-    let like_plan = |unit: f64| (step / unit / plan).ln().abs() <= near.ln();
-    if !constants.is_some_and(fits)
-        && !drive.rows().has_stamps()
-        && let Some((unit, name)) = UNITS.into_iter().find(|(unit, _)| like_plan(*unit))
-    {
-        let message = format!(
-            "a step of {} s, {} s in the study: t seems to be in {name}; {}",
-            text(step),
-            text(plan),
-            conversion(unit)
-        );
-        return (vec![Finding::warning("time", message)], unit);
-    }
     let mut findings = vec![];
     let mut warn = |check, message| findings.push(Finding::warning(check, message));
     if drive.steps_vary() {

@@ -1,5 +1,6 @@
 //! Integrators that carry the equations from one sample to the next.
 
+mod brief;
 mod event;
 mod event_memory;
 mod eventful;

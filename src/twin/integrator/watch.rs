@@ -4,6 +4,7 @@
 //! place then is as smooth a function of states and parameters as the step is. The rest of the stretch is done from there.
 
 use super::Now;
+use super::brief::turned_within;
 use super::event::Event;
 use super::limits::limited;
 use super::path::{Path, Stretch};
@@ -43,7 +44,8 @@ pub(crate) struct EventCalls<'e> {
 }
 
 impl EventCalls<'_> {
-    fn margins(&self, now: &Now<'_>, x: &[f64]) -> Vec<f64> {
+    /// Margins of all conditions at a point.
+    pub fn margins(&self, now: &Now<'_>, x: &[f64]) -> Vec<f64> {
         let mut margins = Vec::with_capacity(self.list.len());
         (self.inside)(now, x, &mut |own| {
             let all = self.list.iter();
@@ -244,6 +246,19 @@ impl EventWatch {
         (0..margins.len()).filter(has_turned).collect()
     }
 
+    /// Returns 1 for conditions that are false at both ends of a stretch with these margins, -1 for true ones, 0 for others.
+    fn same(&self, [begin, end]: [&[f64]; 2]) -> Vec<f64> {
+        let all = self.conditions.iter().enumerate();
+        all.map(
+            |(i, condition)| match (condition, is_true(begin[i]), is_true(end[i])) {
+                (WatchState::False, false, false) => 1.0,
+                (WatchState::True, true, true) => -1.0,
+                _ => 0.0,
+            },
+        )
+        .collect()
+    }
+
     fn keep_false(&mut self, margins: &[f64]) {
         for (condition, margin) in self.conditions.iter_mut().zip(margins) {
             if !is_true(*margin) {
@@ -310,17 +325,27 @@ impl EventWatch {
         }
     }
 
-    /// Cuts a stretch from `from` to `to` at its first event, where `to` then is, changed; returns what is left of the stretch.
+    /// Cuts a stretch from `from` to `to` at its first event, where `to` then is, changed, or where a condition has turned that turns back; returns
+    /// what is left of the stretch.
     pub fn cut(
         &mut self,
         events: &EventsOfWay<'_>,
         (path, step): (&mut Path<'_, '_>, &mut StepBy<'_>),
-        of: Stretch,
+        mut of: Stretch,
         (from, to): (&[f64], &mut [f64]),
     ) -> Stretch {
-        let end = of.from + of.length;
         let begin = path.at(of.from, |now| events.calls.margins(now, from));
+        let mut end = of.from + of.length;
         let mut margins = path.at(end, |now| events.calls.margins(now, to));
+        let ends = [&begin[..], &margins];
+        let (way, signs) = ((&mut *path, &mut *step), self.same(ends));
+        if let Some(share) = turned_within(events, way, of, [from, to], (&signs, ends)) {
+            of.length *= share;
+            to.copy_from_slice(from);
+            step(path, of, to);
+            end = of.from + of.length;
+            margins = path.at(end, |now| events.calls.margins(now, to));
+        }
         let mut waiting = self.turned(events, path, (end, &margins), to);
         let (mut before, mut first, mut at_first) = (of, 1.0, vec![]);
         // An event is located only if it is true where the first one so far is.

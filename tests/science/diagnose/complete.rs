@@ -6,7 +6,7 @@ use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict};
 use truetwin::twin::Noise;
 
 /// A parameter that jumps half-way: the record leaves its twin there, not before, and with the step added nothing is left. The step
-/// is first of the whole library, at its time.
+/// is first, at its time, of effects that change a parameter or last from a time on.
 #[test]
 fn a_gap_begins_where_it_begins() {
     let study = study("tanks");
@@ -14,7 +14,15 @@ fn a_gap_begins_where_it_begins() {
     let text = "[[effect]]\nid='parameter-step'\ntarget='k3'\nmagnitudes={size=0.6,time=100.0}\n";
     let theta = [0.5, 0.45, 0.5, 0.8];
     let record = record(study.twin(), text, &theta, drive(&study, noise), noise);
-    let found = found(&study, record, None);
+    let rivals = [
+        "parameter-step",
+        "parameter-drift",
+        "linear-loss",
+        "constant-forcing",
+        "state-ceiling",
+        "sensor-drift",
+    ];
+    let found = found_among(&study, record, &rivals);
     println!("{}", line("parameter-step@k3", &found));
     let first = &found.cause.effects[0];
     assert_eq!(first.key(), "parameter-step@k3");

@@ -64,7 +64,7 @@ fn many(tanks: usize) {
         inputs: 3,
     };
     let project = Project::from(chain.study(400)).with_features(lags);
-    estimated(chain, project, 400, 1000);
+    estimated(chain, project, 400, 500);
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn twenty_parameters_and_ten_outputs() {
 #[test]
 fn five_thousand_samples() {
     let chain = Chain::pair(Units::PLAIN);
-    estimated(chain, chain.study(5_000), 5_000, 150);
+    estimated(chain, chain.study(5_000), 5_000, 80);
 }
 
 /// `cargo test --release --test science numbers -- --ignored --nocapture`

@@ -78,9 +78,9 @@ fn holds(sampler: &TruthSampler<'_>, kind: Kind, trial: usize) {
 
 #[test]
 fn every_kind_can_be_drawn_of_the_reference_twins_and_repeats() {
-    let plan = RecordPlan::autonomous(0.05, 200);
+    let plan = RecordPlan::autonomous(0.05, 120);
     let oscillator = Study::new("van-der-pol", VanDerPol, plan).unwrap();
-    for study in [oscillator, tanks(200)] {
+    for study in [oscillator, tanks(120)] {
         let sampler = sampler(&study);
         for kind in Kind::ALL {
             sampler.check(kind).unwrap();
@@ -91,7 +91,7 @@ fn every_kind_can_be_drawn_of_the_reference_twins_and_repeats() {
 
 #[test]
 fn every_kind_can_be_drawn_of_a_twin_of_several_outputs() {
-    let study = rooms_of(120);
+    let study = rooms_of(60);
     let sampler = sampler(&study);
     let keys: Vec<&str> = sampler.listed.iter().map(|l| l.key.as_str()).collect();
     for key in [
@@ -293,7 +293,7 @@ fn what_a_distant_theta_absorbs_has_no_information() {
 /// above the least, on average.
 #[test]
 fn pairs_have_information_beside_each_other() {
-    let study = tanks(250);
+    let study = tanks(150);
     let sampler = sampler(&study);
     let all: Vec<f64> = (0..12)
         .map(|trial| draw(&sampler, Kind::Pair, trial).truth.information.unwrap())
@@ -310,7 +310,7 @@ fn pairs_have_information_beside_each_other() {
 /// A drift of the pump's gain is as well one of the pump, and of the tank that it fills.
 #[test]
 fn places_of_the_same_meaning_are_in_the_key() {
-    let study = tanks(250);
+    let study = tanks(100);
     let sampler = sampler(&study);
     let places = |trial| {
         let truth = draw(&sampler, Kind::Listed, trial).truth;
