@@ -55,8 +55,12 @@ pub(super) fn read(
 }
 
 /// Warns of records whose times seem to be in another unit: a fit of them may take long.
-pub(super) fn warn_of_times(study: &Study, paths: &[PathBuf], records: &[Record], seed: u64) {
-    for (path, record) in paths.iter().zip(records) {
+pub(super) fn warn_of_times<'r>(
+    study: &Study,
+    records: impl Iterator<Item = (&'r PathBuf, &'r Record)>,
+    seed: u64,
+) {
+    for (path, record) in records {
         if let Some(message) = study.mistaken_time(record, seed) {
             warn(&format!("{}: {message}", path.display()));
         }

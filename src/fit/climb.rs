@@ -254,6 +254,9 @@ pub(crate) fn fit(
     starts: &[Vec<f64>],
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
+    if let [start] = starts {
+        return climb(problem, start, iterations);
+    }
     for end in reached(problem, starts, iterations)? {
         if let Some(fitted) = end.fitted(problem)? {
             return Ok(Some(fitted));

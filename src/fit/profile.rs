@@ -151,13 +151,25 @@ impl Profiled {
                 axis.deviation = f64::INFINITY;
             }
         }
+        let errors = |problem: &Problem, at: &Fitted| -> Vec<f64> {
+            let slopes = problem.coordinates.slopes(&at.theta);
+            let errors = at.std_errors(problem);
+            (errors.iter().zip(&slopes))
+                .map(|(error, slope)| error / slope)
+                .collect()
+        };
+        let Some(begin) = climb(&problem, &fitted.theta, 0)? else {
+            return Ok(None);
+        };
+        // A narrow prior, which is left out, does not say how far it is to the top.
+        let far = errors(&problem, &begin);
+        for (axis, error) in problem.axes.iter_mut().zip(far) {
+            axis.longest = axis.longest.max(error);
+        }
         let Some(top) = climb(&problem, &fitted.theta, ITERATIONS)? else {
             return Ok(None);
         };
-        let slopes = problem.coordinates.slopes(&top.theta);
-        let errors = (top.std_errors(&problem).iter().zip(&slopes))
-            .map(|(error, slope)| error / slope)
-            .collect();
+        let errors = errors(&problem, &top);
         Ok(Some(Self {
             problem,
             top,
@@ -191,7 +203,7 @@ impl Profiled {
             / BUDGET.profile_parts;
         let mut points: Vec<ProfilePoint> = vec![];
         let answers = self.answers(j);
-        let before = start.iter().zip(&answers).map(|(phi, answer)| phi - answer);
+        let before = (start.iter().zip(&answers)).map(|(phi, answer)| phi - sign * step * answer);
         let (mut before, mut here) = (before.collect::<Vec<f64>>(), start);
         while points.len() < BUDGET.most_profile_fits && here[j] != bound {
             let next = here[j] + sign * step;
@@ -200,7 +212,12 @@ impl Profiled {
             } else {
                 next
             };
-            let Some(point) = self.fitted(&held, (j, next), [&before, &here])? else {
+            let led = self.fitted(&held, (j, next), [&before, &here])?;
+            let point = match led {
+                None => self.fitted(&held, (j, next), [&here, &here])?,
+                led => led,
+            };
+            let Some(point) = point else {
                 break;
             };
             let last = points.last().map_or(0.0, ProfilePoint::root);
@@ -218,14 +235,21 @@ impl Profiled {
         Ok(points)
     }
 
-    /// Rates at which the best of all other entries follow entry j at the top; 0 where the likelihood does not tell.
+    /// Rates at which the best of all other entries follow entry j at the top, to first order: those within their bounds, and what the records do
+    /// not tell stays where it is.
     fn answers(&self, j: usize) -> Vec<f64> {
-        let axes = &self.problem.axes;
-        let is_other = |i: &usize| *i != j && !axes[*i].held;
+        let (axes, c) = (&self.problem.axes, &self.problem.coordinates);
+        let top = c.of(&self.top.theta);
+        let is_free = |i: usize| top[i] > c.lower()[i] && top[i] < c.upper()[i];
+        let is_other = |i: &usize| *i != j && !axes[*i].held && is_free(*i);
         let others: Vec<usize> = (0..axes.len()).filter(is_other).collect();
         let rows = self.top.information.select_rows(&others);
+        let mut own = rows.select_columns(&others);
+        for (a, &i) in others.iter().enumerate() {
+            own[(a, a)] += axes[i].longest.powi(-2);
+        }
         let mut answers = vec![0.0; axes.len()];
-        if let Some(root) = rows.select_columns(&others).cholesky() {
+        if let Some(root) = own.cholesky() {
             let all = root.solve(&rows.column(j));
             for (&i, answer) in others.iter().zip(all.iter()) {
                 answers[i] = -answer;
@@ -397,7 +421,7 @@ mod tests {
     use crate::fit::FitSettings;
     use crate::progress::Progress;
     use crate::record::{Drive, Record, Signal};
-    use crate::study::Study;
+    use crate::study::{Study, StudyFile};
     use crate::twin::{Noise, Now, Outline, Parameter, StateSpace};
 
     /// y = a·b·u + c, the product alone is seen.
@@ -481,6 +505,39 @@ mod tests {
             fit.profiles.iter().all(|p| p.name != "c"),
             "{:?}",
             fit.profiles
+        );
+    }
+
+    /// A line with known noise, and a prior of its slope that is far from the record and says nothing of how far: the exact profile is a parabola.
+    #[test]
+    fn a_far_prior_has_no_part() {
+        let text = "[parameters]\na = { prior = [5.0, 15.0], bounds = [5.0, 15.0] }\n\
+            b = { prior = [0.12, 0.14], bounds = [-50.0, 50.0] }\n[states]\nx = { rate = \"b/1.5\", start = 0.0 }\n\
+            [outputs]\ny = { value = \"a + x\", noise = { std = 3.4, known = true } }\n[noise]\nprocess = \"none\"\n[record]\nstep = 0.5\nsamples = 4\n";
+        let file = StudyFile::parse(text, "line.toml".as_ref()).unwrap();
+        let study = Study::of_file(&file).unwrap();
+        let y = Signal::from_shape_vec((4, 1), vec![-4.8, -3.1, -6.6, -4.5]).unwrap();
+        let record = Record::new(Drive::autonomous(0.5, 4).unwrap(), y).unwrap();
+        let settings = FitSettings {
+            profile: true,
+            ..FitSettings::default()
+        };
+        let fit = study
+            .fit_with(&[record], &settings, &Progress::silent())
+            .unwrap();
+        let near = |end: Option<f64>, exact: f64| end.is_some_and(|end| (end - exact).abs() < 0.03);
+        let [a, b] = [&fit.profiles[0], &fit.profiles[1]];
+        assert!(
+            a.low.is_none() && near(a.high, 6.104),
+            "{:?} {:?}",
+            a.low,
+            a.high
+        );
+        assert!(
+            near(b.low, -17.29) && near(b.high, -8.34),
+            "{:?} {:?}",
+            b.low,
+            b.high
         );
     }
 }

@@ -59,9 +59,7 @@ impl Placed {
         };
         sum_of_one(m, variable, ends)
     }
-}
 
-impl Placed {
     /// Returns whether it has one value for all states of a moment.
     fn is_of_the_moment(&self) -> bool {
         let is_told = matches!(self.function.of, Of::Time | Of::Input(_));
@@ -78,7 +76,7 @@ impl RateChange for Placed {
         (at, x): (Layout, &[f64]),
         dx: &mut [f64],
     ) {
-        let same = (self.is_of_the_moment()).then(|| self.value(m, now, x, 0.0));
+        let same = self.is_of_the_moment().then(|| self.value(m, now, x, 0.0));
         let points = x.chunks_exact(at.stride);
         for (x, rates) in points.zip(dx.chunks_exact_mut(at.stride)) {
             rates[on.target] += same.unwrap_or_else(|| self.value(m, now, x, 0.0));
@@ -95,7 +93,9 @@ impl SignalChange for Placed {
         (at, x): (Layout, &[f64]),
         (p, y): (usize, &mut [f64]),
     ) {
-        let same = (self.is_of_the_moment()).then(|| self.reading(m, now, x, 0.0));
+        let same = self
+            .is_of_the_moment()
+            .then(|| self.reading(m, now, x, 0.0));
         for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
             let signal = &mut y[on.target];
             *signal += same.unwrap_or_else(|| self.reading(m, now, x, *signal));

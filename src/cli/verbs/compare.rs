@@ -38,7 +38,9 @@ impl Verb for Compare {
             let reader = self.columns.reader(&study);
             let (mut measured, validation) =
                 records::read(reader, &self.records, Some(&self.validation))?;
-            records::warn_of_times(&study, &self.records, &measured, context.seed);
+            let all = (self.records.iter().zip(&measured))
+                .chain([&self.validation].into_iter().zip(&validation));
+            records::warn_of_times(&study, all, context.seed);
             let Some(validation) = validation else {
                 continue;
             };

@@ -36,7 +36,7 @@ impl Verb for Fit {
         let folder = output::asked_folder(&self.out)?;
         let study = context.study(&self.subject)?;
         let (records, _) = records::read(self.columns.reader(&study), &self.records, None)?;
-        records::warn_of_times(&study, &self.records, &records, context.seed);
+        records::warn_of_times(&study, self.records.iter().zip(&records), context.seed);
         let settings = FitSettings {
             seed: context.seed,
             draws: self.draws.count()?,

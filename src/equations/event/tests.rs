@@ -479,3 +479,60 @@ fn faults_of_events_have_their_place() {
         twin.text()
     );
 }
+
+/// Outputs at the second row and the last, of twins whose events are met too often or too seldom where a step hides them.
+#[test]
+fn events_are_counted_as_by_hand() {
+    let window = "x = { rate = \"p\", start = 0.0 }\nn = { rate = \"0\", start = 0.0 }";
+    let ramp = |when: &str| (window, format!("when = \"{when}\"\nadd = {{ n = 1 }}"), "n");
+    let changed = "x = { rate = \"p\", start = 0.0 }\nz = { rate = \"1\", start = 5.0 }\nn = { rate = \"0\", start = 0.0 }";
+    let own = |when: &str| {
+        (
+            changed,
+            format!("when = \"{when}\"\nset = {{ z = -1 }}\nadd = {{ n = 1 }}"),
+            "n",
+        )
+    };
+    let held = "x = { rate = \"-2*p\", start = 0.5, limits = [-1, 1] }\nz = { rate = \"1\", start = 0.0 }\nm = { rate = \"0\", start = 0.0 }";
+    let added = |when: &str| {
+        (
+            held,
+            format!("{when}\nadd = {{ x = 0.5 }}\nset = {{ m = \"x\" }}"),
+        )
+    };
+    let floor =
+        "x = { rate = \"-p\", start = 0.5, limits = [0, 10] }\nn = { rate = \"0\", start = 0.0 }";
+    let counted = |when: &str| (floor, format!("when = \"{when}\"\nadd = {{ n = 1 }}"), "n");
+    let of = |(states, event): (&'static str, String), output| (states, event, output);
+    let cases = [
+        (ramp("x > 1.31 and x < 1.34"), [0.0, 1.0]),
+        (ramp("abs(x - 1.325) < 1e-5"), [0.0, 1.0]),
+        (ramp("x < 1.31 or x > 1.34"), [0.0, 1.0]),
+        (ramp("not (x > 1.31 and x < 1.34)"), [0.0, 1.0]),
+        // It stays true by its first part, whatever its event does to the second.
+        (own("x > 0.5 or z < 0"), [1.0, 1.0]),
+        (own("max(x - 0.5, -1 - z) > 0"), [1.0, 1.0]),
+        // Held at -1 from 0.75 s on: to -0.5 at 0.9 s, and down again.
+        (of(added("when = \"z > 0.9\""), "x"), [-0.7, -1.0]),
+        (of(added("at = [0.9]"), "m"), [-1.0, -1.0]),
+        (counted("x < -0.2"), [0.0, 0.0]),
+        (counted("x < 0"), [1.0, 1.0]),
+    ];
+    for ((states, event, output), expected) in cases {
+        for rule in ["adaptive", "stiff", "runge-kutta-4"] {
+            let text = format!(
+                "[parameters]\np = {{ prior = [0.1, 9.0] }}\n[states]\n{states}\n[outputs]\ny = {{ value = \"{output}\" }}\n[[event]]\n{event}\n"
+            );
+            let drive = Drive::autonomous(1.0, 5).unwrap();
+            let y = under(rule, &text)
+                .simulate(&[1.0], &drive, Noise::OFF)
+                .unwrap();
+            let found = [y[[1, 0]], y[[4, 0]]];
+            let is_right = found
+                .iter()
+                .zip(expected)
+                .all(|(y, right)| (y - right).abs() < 1e-6);
+            assert!(is_right, "{rule}, {event}: {found:?}, {expected:?}");
+        }
+    }
+}

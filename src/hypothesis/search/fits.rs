@@ -32,10 +32,9 @@ pub(crate) fn fit_promise(
     effort: Effort,
 ) -> Result<Option<Model>, FilterError> {
     let extended = model.extend(&promise.term)?;
-    let Range { start, end } = effort.starts;
-    let all = promise.starts.iter().take(end);
+    let chosen = promise.starts.iter().take(effort.starts.end);
     let settled = settling_last(&extended.problem, &extended);
-    let mut from: Vec<Vec<f64>> = (all.skip(start))
+    let mut from: Vec<Vec<f64>> = (chosen.skip(effort.starts.start))
         .map(|start| {
             let theta = begin(model, &extended, start)?;
             Ok(if start.scales { settled(theta)? } else { theta })

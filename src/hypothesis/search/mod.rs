@@ -228,7 +228,7 @@ fn fit_on(
         let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, found.last()));
         let fitted = match promise {
             Some(promise) => {
-                // The best of the first starts is carried on.
+                // The first starts have had their climbs.
                 let first = if has_begun(promise) {
                     SEARCH.first_starts
                 } else {

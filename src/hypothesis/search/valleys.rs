@@ -91,11 +91,15 @@ fn begun_again(
     let from: Vec<Vec<f64>> = (starts.iter())
         .map(|(theta, m)| settled(extended.from(theta, model.beside(&extended, m))))
         .collect::<Result<_, _>>()?;
-    let begun = reached(&own.problem, &from, SEARCH.begun_again)?;
-    let Some(begun) = (begun.first()).filter(|begun| begun.objective > own.fitted.objective) else {
-        return Ok(None);
-    };
-    let carried = climb(&own.problem, &begun.theta, SEARCH.carried)?;
+    let all = reached(&own.problem, &from, SEARCH.begun_again)?;
+    let better = |end: &&Reached| end.objective > own.fitted.objective;
+    let mut carried = None;
+    for end in all.iter().take_while(better) {
+        carried = climb(&own.problem, &end.theta, SEARCH.carried)?;
+        if carried.is_some() {
+            break;
+        }
+    }
     let better = carried.and_then(|carried| own.refitted(carried));
     Ok(better.map(|m| Explanation {
         terms: m.terms.clone(),

@@ -136,7 +136,8 @@ impl Study {
             let drive = self.drives().ok()?.draw(noise).ok()?;
             self.time_constants(&self.planned(drive, noise)?)
         };
-        let (_, message) = time::mistaken_unit(self, record.drive(), constants)?;
+        let drive = record.drive().first(LIMITS.looked_at);
+        let (_, message) = time::mistaken_unit(self, &drive, constants)?;
         Some(message)
     }
 

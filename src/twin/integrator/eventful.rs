@@ -67,6 +67,7 @@ impl Workspace {
             now: &way,
             inputs: &mut refined.inputs,
             drift,
+            held: vec![],
             breaks: &breaks,
             edge: edge(&way, jumps),
             limits: LimitsOfWay::of(n, &refined.limits, (&mut refined.within, beyond))

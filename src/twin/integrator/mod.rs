@@ -10,6 +10,7 @@ mod path;
 mod rosenbrock;
 mod rule;
 mod schedule;
+mod slide;
 mod spline;
 #[cfg(test)]
 mod tests;

@@ -27,6 +27,8 @@ pub(super) struct Path<'p, 'n> {
     pub edge: f64,
     /// Limits of the states on the way; `None` where they act at the ends of steps alone.
     pub limits: Option<LimitsOfWay<'p>>,
+    /// Rates of entries that have others than those of the equations; NaN for the others, and none where no entry has.
+    pub held: Vec<f64>,
 }
 
 impl Path<'_, '_> {
@@ -62,6 +64,11 @@ impl Path<'_, '_> {
         match &mut self.limits {
             Some(limits) => limits.rates(self.drift, &stage, x, dx),
             None => (self.drift)(&stage, x, dx),
+        }
+        for (dx, held) in dx.iter_mut().zip(&self.held) {
+            if !held.is_nan() {
+                *dx = *held;
+            }
         }
     }
 

@@ -5,6 +5,7 @@ use super::pair::{self, ExplicitPair};
 use super::path::{Path, Stretch};
 use super::rosenbrock::{self, Rosenbrock};
 use super::rule::{Integrator, MOST_SUBSTEPS, Stepping};
+use super::slide::slide;
 use super::watch::{EventWatch, EventsOfWay, StepBy};
 use crate::math::three_digits;
 use crate::setting::number;
@@ -253,10 +254,18 @@ impl SubstepSchedule {
         x: &mut [f64],
         errors: Option<&mut [f64]>,
     ) {
-        match (self.is_implicit, self.is_even) {
-            (true, _) => self.implicit.step(path, of, (&self.sizes, x), errors),
-            (false, true) => self.explicit.midpoint_step(path, of, x),
-            (false, false) => self.explicit.step(path, of, x, errors),
+        let (sizes, n) = (&self.sizes, self.sizes.len());
+        if self.is_even {
+            let mut step =
+                |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| match self.is_implicit {
+                    true => self.implicit.step(path, of, (sizes, x), None),
+                    false => self.explicit.midpoint_step(path, of, x),
+                };
+            return slide(path, of, (n, x), &mut step);
+        }
+        match self.is_implicit {
+            true => self.implicit.step(path, of, (sizes, x), errors),
+            false => self.explicit.step(path, of, x, errors),
         }
     }
 

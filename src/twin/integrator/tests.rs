@@ -56,6 +56,7 @@ fn convergence_orders() {
                 now: &now,
                 inputs: &mut [],
                 drift: &mut pendulum,
+                held: vec![],
                 breaks: &[],
                 edge: 0.0,
                 limits: None,

@@ -23,7 +23,9 @@ const CLOSE: f64 = 1e-14;
 /// Trials of a place: a margin that jumps halves the stretch with every third.
 const TRIES: usize = 150;
 /// Share of the way over which a condition is watched for its direction: far above rounding, far below the motion.
-const PROBE: f64 = 1e-6;
+pub(super) const PROBE: f64 = 1e-6;
+/// Share of what a state is beyond a limit that its conditions see: as much as shows that it is there, and less than is between two thresholds.
+const BEYOND: f64 = 1e-6;
 /// Share of the way within which a time is that of a row.
 const SAME: f64 = 1e-9;
 
@@ -122,6 +124,35 @@ impl EventsOfWay<'_> {
     fn limit(&self, x: &mut [f64]) {
         limited(x.len(), x, self.limits);
     }
+
+    /// Margins of all conditions at a point, of which what is beyond its limits is just beyond them: there the motion has it for events.
+    pub fn margins(&self, now: &Now<'_>, x: &[f64]) -> Vec<f64> {
+        let is_beyond = |(j, limit): &(usize, Interval)| limit.clamp(x[*j]) != x[*j];
+        if !self.limits.iter().any(is_beyond) {
+            return self.calls.margins(now, x);
+        }
+        let mut seen = x.to_vec();
+        for &(j, limit) in self.limits {
+            let held = limit.clamp(x[j]);
+            seen[j] = held + BEYOND * (x[j] - held);
+        }
+        self.calls.margins(now, &seen)
+    }
+
+    /// Changes a point by an event, from within its limits; returns the margins behind it, by which what the event leaves stays beyond them.
+    fn change(&self, event: usize, now: &Now<'_>, x: &mut [f64]) -> Vec<f64> {
+        let free = x.to_vec();
+        self.limit(x);
+        let held = x.to_vec();
+        self.calls.change(event, now, x);
+        let mut seen = x.to_vec();
+        for ((seen, held), free) in seen.iter_mut().zip(held).zip(free) {
+            if *seen == held {
+                *seen = free;
+            }
+        }
+        self.margins(now, &seen)
+    }
 }
 
 /// A condition along the way of a point.
@@ -154,7 +185,7 @@ impl EventWatch {
         before: Option<&[bool]>,
         x: &mut [f64],
     ) -> Self {
-        let margins = path.at(0.0, |now| events.calls.margins(now, x));
+        let margins = path.at(0.0, |now| events.margins(now, x));
         let mut conditions = vec![];
         for (i, margin) in margins.iter().enumerate() {
             conditions.push(match before {
@@ -199,7 +230,7 @@ impl EventWatch {
         share: f64,
         x: &mut [f64],
     ) {
-        let margins = path.at(share, |now| events.calls.margins(now, x));
+        let margins = path.at(share, |now| events.margins(now, x));
         let first = self.turned(events, path, (share, &margins), x);
         for (i, margin) in margins.iter().enumerate() {
             if !is_true(*margin) && !is_held(events, path, (share, i), x) {
@@ -247,7 +278,7 @@ impl EventWatch {
     }
 
     /// Returns 1 for conditions that are false at both ends of a stretch with these margins, -1 for true ones, 0 for others.
-    fn same(&self, [begin, end]: [&[f64]; 2]) -> Vec<f64> {
+    fn unchanged(&self, [begin, end]: [&[f64]; 2]) -> Vec<f64> {
         let all = self.conditions.iter().enumerate();
         all.map(
             |(i, condition)| match (condition, is_true(begin[i]), is_true(end[i])) {
@@ -277,7 +308,7 @@ impl EventWatch {
     ) {
         let mut fired = vec![false; self.conditions.len()];
         let mut next = 0;
-        let mut margins = path.at(share, |now| events.calls.margins(now, x));
+        let mut margins = path.at(share, |now| events.margins(now, x));
         while next < waiting.len() && self.fault().is_none() {
             let event = waiting[next];
             next += 1;
@@ -288,10 +319,7 @@ impl EventWatch {
                 false => 1,
             };
             self.last = (event, share);
-            let after = path.at(share, |now| {
-                events.calls.change(event, now, x);
-                events.calls.margins(now, x)
-            });
+            let after = path.at(share, |now| events.change(event, now, x));
             events.limit(x);
             for (i, (before, after)) in margins.iter().zip(&after).enumerate() {
                 if i != event && !is_true(*before) && is_true(*after) {
@@ -304,9 +332,11 @@ impl EventWatch {
             if !is_true(margins[i]) {
                 self.conditions[i] = WatchState::False;
             } else if fired {
-                self.conditions[i] = match grows(events, path, (share, i), x) {
-                    true => WatchState::True,
-                    false => WatchState::Pending,
+                // A margin that the motion leaves within rounding of times is that of the event itself.
+                let leaves = -SAME / PROBE * growth(events, path, (share, i), x);
+                self.conditions[i] = match margins[i] < leaves {
+                    true => WatchState::Pending,
+                    false => WatchState::True,
                 };
             }
         }
@@ -325,8 +355,8 @@ impl EventWatch {
         }
     }
 
-    /// Cuts a stretch from `from` to `to` at its first event, where `to` then is, changed, or where a condition has turned that turns back; returns
-    /// what is left of the stretch.
+    /// Cuts a stretch from `from` to `to` at its first event, where `to` then is, changed; or within a dip of a condition that is true at both ends.
+    /// Returns what is left of the stretch.
     pub fn cut(
         &mut self,
         events: &EventsOfWay<'_>,
@@ -334,17 +364,17 @@ impl EventWatch {
         mut of: Stretch,
         (from, to): (&[f64], &mut [f64]),
     ) -> Stretch {
-        let begin = path.at(of.from, |now| events.calls.margins(now, from));
+        let begin = path.at(of.from, |now| events.margins(now, from));
         let mut end = of.from + of.length;
-        let mut margins = path.at(end, |now| events.calls.margins(now, to));
+        let mut margins = path.at(end, |now| events.margins(now, to));
         let ends = [&begin[..], &margins];
-        let (way, signs) = ((&mut *path, &mut *step), self.same(ends));
+        let (way, signs) = ((&mut *path, &mut *step), self.unchanged(ends));
         if let Some(share) = turned_within(events, way, of, [from, to], (&signs, ends)) {
             of.length *= share;
             to.copy_from_slice(from);
             step(path, of, to);
             end = of.from + of.length;
-            margins = path.at(end, |now| events.calls.margins(now, to));
+            margins = path.at(end, |now| events.margins(now, to));
         }
         let mut waiting = self.turned(events, path, (end, &margins), to);
         let (mut before, mut first, mut at_first) = (of, 1.0, vec![]);
@@ -362,12 +392,13 @@ impl EventWatch {
             to.copy_from_slice(from);
             step(path, before, to);
             let share = before.from + before.length;
-            margins = path.at(share, |now| events.calls.margins(now, to));
+            margins = path.at(share, |now| events.margins(now, to));
             waiting = self.turned(events, path, (share, &margins), to);
             waiting.retain(|other| *other != event);
         }
         if at_first.is_empty() {
             self.keep_false(&margins);
+            events.limit(to);
             return of;
         }
         at_first.sort_unstable();
@@ -415,27 +446,39 @@ fn is_held(events: &EventsOfWay<'_>, path: &mut Path<'_, '_>, at: (f64, usize), 
 }
 
 /// Returns whether the motion leads further into a condition, or does not change it.
-fn grows(
+fn grows(events: &EventsOfWay<'_>, path: &mut Path<'_, '_>, at: (f64, usize), x: &[f64]) -> bool {
+    growth(events, path, at, x) >= 0.0
+}
+
+/// Change of a margin by the motion, a share of the way ahead.
+fn growth(
     events: &EventsOfWay<'_>,
     path: &mut Path<'_, '_>,
     (share, event): (f64, usize),
     x: &[f64],
-) -> bool {
-    let of = Stretch {
-        from: share,
-        length: PROBE,
-    };
+) -> f64 {
+    let moved = moved(path, (share, PROBE), x);
+    let here = path.at(share, |now| events.margins(now, x)[event]);
+    let there = path.at(share + PROBE, |now| events.margins(now, &moved)[event]);
+    there - here
+}
+
+/// Returns a point a share of the way before or behind its own.
+pub(super) fn moved(path: &mut Path<'_, '_>, (share, by): (f64, f64), x: &[f64]) -> Vec<f64> {
+    let (part, of) = (
+        if by < 0.0 { 1.0 } else { 0.0 },
+        Stretch {
+            from: share + by.min(0.0),
+            length: by.abs(),
+        },
+    );
     let mut moved = vec![0.0; x.len()];
-    path.rates(of, 0.0, x, &mut moved);
-    let seconds = path.seconds(of);
+    path.rates(of, part, x, &mut moved);
+    let seconds = path.seconds(of).copysign(by);
     for (moved, x) in moved.iter_mut().zip(x) {
         *moved = x + seconds * *moved;
     }
-    let here = path.at(share, |now| events.calls.margins(now, x)[event]);
-    let there = path.at(share + PROBE, |now| {
-        events.calls.margins(now, &moved)[event]
-    });
-    there >= here
+    moved
 }
 
 /// Takes out the event whose condition, on a line from its margin at the beginning to that at the end, becomes true first.
@@ -458,7 +501,7 @@ fn located(
     (event, end, margin, is_pending): (usize, f64, f64, bool),
 ) -> f64 {
     let margin_at = |path: &mut Path<'_, '_>, share: f64, x: &[f64]| {
-        let margin = path.at(share, |now| events.calls.margins(now, x)[event]);
+        let margin = path.at(share, |now| events.margins(now, x)[event]);
         let leaves = is_pending && margin > 0.0 && !grows(events, path, (share, event), x);
         if leaves { -margin } else { margin }
     };

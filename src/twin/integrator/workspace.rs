@@ -193,6 +193,7 @@ impl Workspace {
                     now,
                     inputs: &mut refined.inputs,
                     drift,
+                    held: vec![],
                     breaks: &breaks(now, jumps, []),
                     edge: edge(now, jumps),
                     limits: LimitsOfWay::of(

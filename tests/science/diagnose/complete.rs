@@ -6,7 +6,7 @@ use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict};
 use truetwin::twin::Noise;
 
 /// A parameter that jumps half-way: the record leaves its twin there, not before, and with the step added nothing is left. The step
-/// is first, at its time, of effects that change a parameter or last from a time on.
+/// is first, at its time, of effects on parameters, rates and the sensor.
 #[test]
 fn a_gap_begins_where_it_begins() {
     let study = study("tanks");
