@@ -1,7 +1,7 @@
 //! Conditions that turn and turn back within one stretch, which its ends do not show.
 
+use super::event_calls::{EventsOfWay, PROBE, StepBy, moved};
 use super::path::{Path, Stretch};
-use super::watch::{EventsOfWay, PROBE, StepBy, moved};
 
 /// Looks at a hump, at most: four find most tops to rounding.
 const LOOKS: usize = 30;

@@ -1,8 +1,9 @@
 //! Events of a twin up to the last sample, which those of the next go on from.
 
 use super::Now;
+use super::event_calls::EventsOfWay;
 use super::path::Path;
-use super::watch::{EventWatch, EventsOfWay};
+use super::watch::EventWatch;
 use crate::setting::number;
 
 /// Share of a step within which two times are one.

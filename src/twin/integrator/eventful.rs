@@ -1,9 +1,9 @@
 //! The way to the next sample of a twin with events.
 
+use super::event_calls::{EventCalls, EventsOfWay};
 use super::limits::{LimitsOfWay, limited};
 use super::path::{Path, Stretch, breaks, edge};
 use super::rule::Integrator;
-use super::watch::{EventCalls, EventsOfWay};
 use super::workspace::Workspace;
 use super::{Now, Rates};
 use crate::setting::number;

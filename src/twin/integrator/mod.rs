@@ -2,6 +2,7 @@
 
 mod brief;
 mod event;
+mod event_calls;
 mod event_memory;
 mod eventful;
 mod limits;
@@ -20,12 +21,12 @@ mod workspace;
 use serde::{Deserialize, Serialize};
 
 pub use event::Event;
+pub(crate) use event_calls::EventCalls;
 pub(super) use limits::felt;
 pub use rule::{Integrator, Stepping};
 pub(crate) use rule::{MOST_SUBSTEPS, TOLERANCES};
 pub use schedule::StepsTaken;
 pub(crate) use spline::Bends;
-pub(crate) use watch::EventCalls;
 pub(crate) use workspace::{TellJumps, Workspace};
 
 /// Time, step, inputs and parameters at which equations are evaluated.

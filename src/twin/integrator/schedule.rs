@@ -1,12 +1,13 @@
 //! Substeps to a tolerance: chosen for the points of a filter together and taken by all of them, so that what is between two samples is one smooth
 //! function for all of them, and for all θ of the passes that go side by side.
 
+use super::event_calls::{EventsOfWay, StepBy};
 use super::pair::{self, ExplicitPair};
 use super::path::{Path, Stretch};
 use super::rosenbrock::{self, Rosenbrock};
 use super::rule::{Integrator, MOST_SUBSTEPS, Stepping};
 use super::slide::slide;
-use super::watch::{EventWatch, EventsOfWay, StepBy};
+use super::watch::EventWatch;
 use crate::math::three_digits;
 use crate::setting::number;
 use serde::Serialize;

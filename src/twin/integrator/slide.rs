@@ -10,8 +10,8 @@
 //! Sources: Filippov, *Differential Equations with Discontinuous Righthand Sides* (1988), section 4; Acary and Brogliato, *Implicit Euler numerical
 //! scheme and chattering-free implementation of sliding mode systems*, Systems & Control Letters 59 (2010) 284–293.
 
+use super::event_calls::StepBy;
 use super::path::{Path, Stretch};
-use super::watch::StepBy;
 use crate::math::descending;
 use smallvec::SmallVec;
 
