@@ -149,6 +149,9 @@ pub(super) struct SubstepSchedule {
     sizes: Vec<f64>,
     /// `true` where rates jump in this sample: steps are then of one length, and no high order is of use.
     is_even: bool,
+    /// `true` where one run takes steps of one length: then what jumps of rates hold stays there. Points of a filter come off such a place with every
+    /// row, and finding it for each would cost ten times what their steps do.
+    is_sliding: bool,
     explicit: ExplicitPair,
     implicit: Rosenbrock,
     buffers: ScheduleBuffers,
@@ -188,6 +191,7 @@ impl SubstepSchedule {
             next: f64::INFINITY,
             sizes: vec![0.0; states],
             is_even: false,
+            is_sliding: false,
             explicit: ExplicitPair::default(),
             implicit: Rosenbrock::default(),
             buffers: ScheduleBuffers::default(),
@@ -256,17 +260,20 @@ impl SubstepSchedule {
         errors: Option<&mut [f64]>,
     ) {
         let (sizes, n) = (&self.sizes, self.sizes.len());
-        if self.is_even {
-            let mut step =
-                |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| match self.is_implicit {
-                    true => self.implicit.step(path, of, (sizes, x), None),
-                    false => self.explicit.midpoint_step(path, of, x),
-                };
-            return slide(path, of, (n, x), &mut step);
+        if !self.is_even {
+            return match self.is_implicit {
+                true => self.implicit.step(path, of, (sizes, x), errors),
+                false => self.explicit.step(path, of, x, errors),
+            };
         }
-        match self.is_implicit {
-            true => self.implicit.step(path, of, (sizes, x), errors),
-            false => self.explicit.step(path, of, x, errors),
+        let mut step = |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| match self.is_implicit
+        {
+            true => self.implicit.step(path, of, (sizes, x), None),
+            false => self.explicit.midpoint_step(path, of, x),
+        };
+        match self.is_sliding {
+            true => slide(path, of, (n, x), &mut step),
+            false => step(path, of, x),
         }
     }
 
@@ -281,6 +288,7 @@ impl SubstepSchedule {
         let mut buffers = std::mem::take(&mut self.buffers);
         buffers.begin(x, &self.sizes);
         let was_rough = std::mem::take(&mut self.is_even);
+        self.is_sliding = false;
         let begins_rough = was_rough && self.jumps(path, x, 0.0, [1.0 / EVEN as f64, 1.0]);
         let most = match self.may_change && !self.is_implicit {
             true => MANY,
@@ -304,6 +312,7 @@ impl SubstepSchedule {
         }
         if matches!(outcome, SampleSteps::Rough) {
             buffers.undo(x, &mut self.sizes);
+            self.is_sliding = !is_followed;
             self.take_even_steps(path, x, (events, &mut buffers.trial));
         }
         self.buffers = buffers;
@@ -340,7 +349,10 @@ impl SubstepSchedule {
                 return SampleSteps::Rough;
             }
             let lengths = JUMPS.map(|factor| factor * next / dt);
-            if tries > 0 && tries % patience == 0 && self.jumps(path, x, from, lengths) {
+            // Steps short enough to stay on a jump are all kept.
+            let is_long = steps > 0 && steps % (4 * patience) == 0;
+            let is_tried = tries > 0 && tries % patience == 0;
+            if (is_tried || is_long) && self.jumps(path, x, from, lengths) {
                 return SampleSteps::Rough;
             }
             // Explicit steps that are short for another reason than stiffness go on.

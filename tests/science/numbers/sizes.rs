@@ -88,7 +88,7 @@ fn twenty_parameters_and_ten_outputs() {
 #[test]
 fn five_thousand_samples() {
     let chain = Chain::pair(Units::PLAIN);
-    estimated(chain, chain.study(5_000), 5_000, 80);
+    estimated(chain, chain.study(5_000), 5_000, 100);
 }
 
 /// `cargo test --release --test science numbers -- --ignored --nocapture`
