@@ -4,6 +4,7 @@ use super::base::Base;
 use super::settings::DiagnoseSettings;
 use crate::effect::{Catalogue, augment};
 use crate::fit::Passes;
+use crate::hypothesis::search::model::Model;
 use crate::hypothesis::term::Term;
 use crate::record::Record;
 use crate::study::{RecordPlan, Study};
@@ -44,10 +45,16 @@ pub(crate) fn only(study: &Study, ids: &[&str]) -> DiagnoseSettings {
     }
 }
 
-/// Listed effects as hypotheses beside the fitted twin of a study.
-pub(crate) fn listed_terms(study: &Study, records: &[Record]) -> Vec<Arc<Term>> {
+/// The fitted twin of a study, and listed effects as hypotheses beside it.
+pub(crate) fn fitted(study: &Study, records: &[Record]) -> (Model, Vec<Arc<Term>>) {
     let settings = DiagnoseSettings::default();
     let passes = Passes::default();
     let base = Base::new(study, study.twin(), records.into(), &settings, &passes).unwrap();
-    base.listed(study, &settings).unwrap()
+    let terms = base.listed(study, &settings).unwrap();
+    (base.model, terms)
+}
+
+/// Listed effects as hypotheses beside the fitted twin of a study.
+pub(crate) fn listed_terms(study: &Study, records: &[Record]) -> Vec<Arc<Term>> {
+    fitted(study, records).1
 }

@@ -235,26 +235,36 @@ pub(super) fn constrain_together(
 ) -> bool {
     let shifts = &points.shifts[..n];
     let (moving, shifted) = points.all.split_at_mut(points.moving * n);
-    let pairs = || (shifts.iter().enumerate()).flat_map(|(i, s)| [(i, *s), (i, -s)]);
     let before = work.stages().stage(n);
     before.copy_from_slice(&moving[..n]);
-    for (x, of) in shifted.chunks_exact_mut(n).zip(pairs()) {
-        for (j, x) in x.iter_mut().enumerate() {
-            *x = shifted_value(before, of, j);
+    for ((i, shift), pair) in shifts
+        .iter()
+        .enumerate()
+        .zip(shifted.chunks_exact_mut(2 * n))
+    {
+        for (x, shift) in pair.chunks_exact_mut(n).zip([*shift, -shift]) {
+            x.copy_from_slice(before);
+            x[i] += shift;
         }
     }
     constrain(points.all);
     let (moving, shifted) = points.all.split_at(points.moving * n);
-    let mut bent = false;
-    for (x, before) in moving[..n].iter().zip(&*before) {
-        bent |= x.to_bits() != before.to_bits();
-    }
-    for (x, of) in shifted.chunks_exact(n).zip(pairs()) {
-        for (j, x) in x.iter().enumerate() {
-            bent |= x.to_bits() != shifted_value(before, of, j).to_bits();
+    let mut bent = differ(&moving[..n], before);
+    for ((i, shift), pair) in shifts.iter().enumerate().zip(shifted.chunks_exact(2 * n)) {
+        let centre = before[i];
+        for (x, shift) in pair.chunks_exact(n).zip([*shift, -shift]) {
+            before[i] = centre + shift;
+            bent |= differ(x, before);
         }
+        before[i] = centre;
     }
     bent
+}
+
+/// Returns whether any bit differs.
+#[inline(always)]
+fn differ(x: &[f64], y: &[f64]) -> bool {
+    (x.iter().zip(y)).fold(false, |any, (x, y)| any | (x.to_bits() != y.to_bits()))
 }
 
 /// Carries the points of several filters, one after the other; returns the lanes in which a constraint acted. The buffers hold points and
@@ -390,9 +400,5 @@ fn changes(values: &mut [f64], with: impl FnOnce(&mut [f64])) -> bool {
         &many
     };
     with(values);
-    let mut changed = false;
-    for (value, before) in values.iter().zip(before) {
-        changed |= value.to_bits() != before.to_bits();
-    }
-    changed
+    differ(values, before)
 }

@@ -2,8 +2,9 @@
 
 use super::explanation::Explanation;
 use super::fits::settling_last;
-use super::model::Model;
+use super::model::{Extended, Model};
 use crate::fit::climb::{Reached, climb, reach, reached};
+use crate::fit::problem::Problem;
 use crate::hypothesis::limits::{SEARCH, TERM};
 use crate::hypothesis::term::Term;
 use crate::likelihood::kalman::FilterError;
@@ -12,16 +13,20 @@ use crate::parallel::try_each;
 /// θ of the twin and magnitudes.
 type Start = (Vec<f64>, Vec<f64>);
 
+/// Full θ, and the objective there.
+type Place = (Vec<f64>, f64);
+
 /// Fits effects again that may be better, `all` being sorted, best first: from where the same law ended at places where it explains more,
-/// with either sign of its size; the best ones from times nearby.
+/// with either sign of its size; from better times; the best ones from all times nearby.
 pub(super) fn leave_valleys(
     model: &Model,
     all: &mut [Explanation],
     floor: f64,
 ) -> Result<(), FilterError> {
     let top = all.first().map_or(floor, |f| f.log_z);
-    let least = (top - SEARCH.candidates).max(floor + SEARCH.null_like);
-    let better = try_each(0..all.len(), |i| again(model, &all[i], &all[..i], least))?;
+    let worth = floor + SEARCH.null_like;
+    let levels = [worth, worth.max(top - SEARCH.candidates)];
+    let better = try_each(0..all.len(), |i| again(model, &all[i], &all[..i], levels))?;
     for (old, new) in all.iter_mut().zip(better) {
         if let Some(new) = new.filter(|new| new.log_z > old.log_z) {
             *old = new;
@@ -30,17 +35,18 @@ pub(super) fn leave_valleys(
     Ok(())
 }
 
-/// One effect fitted again; `None` where no start leads further. Only effects of at least so many nats are looked at.
+/// One effect fitted again; `None` where no start leads further. From `worth` on an effect has its time moved, from `least` on it is near the best.
 fn again(
     model: &Model,
     found: &Explanation,
     before: &[Explanation],
-    least: f64,
+    [worth, least]: [f64; 2],
 ) -> Result<Option<Explanation>, FilterError> {
-    let Some(shape) = found.last().shape() else {
+    let (Some(shape), Some(own)) = (found.last().shape(), &found.model) else {
         return Ok(None);
     };
     let term = found.last();
+    let extended = model.extend(term)?;
     let alike = (before.iter())
         .filter(|other| other.log_z > least && other.last().shape().as_ref() == Some(&shape))
         .filter_map(|other| Some((other.own_theta()?, other.magnitudes()?)));
@@ -54,14 +60,15 @@ fn again(
         starts.push((theta, m));
     }
     let is_beaten = !starts.is_empty();
+    // One sample beside its time an effect may be a dozen nats short: none is called worse before it has the best time in reach.
     if found.log_z > least {
         starts.extend(nearby(found, term));
+    } else if found.log_z > worth && !own.problem.is_simulated() {
+        starts.extend(at_another_time(own, &extended)?);
     }
-    if is_beaten {
-        starts.extend(between(model, found)?);
-    }
-    if starts.is_empty() {
-        return Ok(None);
+    if is_beaten && let Some(place) = between(own, &extended)? {
+        let place = at_its_time(own, &extended, place)?;
+        starts.push(start_of(own, &extended, place));
     }
     let mut best = begun_again(model, found, &starts)?;
     for _ in 1..SEARCH.rounds {
@@ -83,7 +90,7 @@ fn begun_again(
     found: &Explanation,
     starts: &[Start],
 ) -> Result<Option<Explanation>, FilterError> {
-    let Some(own) = &found.model else {
+    let Some(own) = found.model.as_ref().filter(|_| !starts.is_empty()) else {
         return Ok(None);
     };
     let extended = model.extend(found.last())?;
@@ -110,33 +117,76 @@ fn begun_again(
 
 /// The best of times closer together than those tried first, θ and the size having answered each; `None` for a law without a time, or
 /// with several.
-fn between(model: &Model, found: &Explanation) -> Result<Option<Start>, FilterError> {
-    let (Some(own), &[time]) = (&found.model, &found.last().times()[..]) else {
+fn between(own: &Model, extended: &Extended) -> Result<Option<Place>, FilterError> {
+    let Some(&[time]) = extended.terms.last().map(|term| term.times()).as_deref() else {
         return Ok(None);
     };
-    let extended = model.extend(found.last())?;
     let time = extended.entries[time];
     let held = own.problem.holding(|j| j == time);
     let record = &own.problem.records[0];
     let (count, mut theta) = (SEARCH.closer * (TERM.times + 1), own.fitted.theta.clone());
-    let mut best: Option<Reached> = None;
+    let mut best: Option<Place> = None;
     for i in 1..count {
         theta[time] = record.drive().dt() * (record.samples() * i) as f64 / count as f64;
         if let Some(end) = reach(&held, &theta, SEARCH.answers)? {
             theta.clone_from(&end.theta);
-            if best
-                .as_ref()
-                .is_none_or(|best| end.objective > best.objective)
-            {
-                best = Some(end);
+            if best.as_ref().is_none_or(|best| end.objective > best.1) {
+                best = Some((end.theta, end.objective));
             }
         }
     }
-    let d = own.base.parameters().len();
-    Ok(best.map(|best| {
-        let m = extended.entries.iter().map(|&j| best.theta[j]).collect();
-        (best.theta[..d].to_vec(), m)
-    }))
+    Ok(best)
+}
+
+/// A better time or delay of a fit than its own; `None` where there is none in reach.
+fn at_another_time(own: &Model, extended: &Extended) -> Result<Option<Start>, FilterError> {
+    let here = own.fitted.objective;
+    let place = at_its_time(own, extended, (own.fitted.theta.clone(), here))?;
+    Ok((place.1 > here).then(|| start_of(own, extended, place)))
+}
+
+fn start_of(own: &Model, extended: &Extended, (theta, _): Place) -> Start {
+    let m = extended.entries.iter().map(|&j| theta[j]).collect();
+    (theta[..own.base.parameters().len()].to_vec(), m)
+}
+
+/// The place that ever shorter moves of each time or delay lead to, θ and the size having answered each.
+fn at_its_time(own: &Model, extended: &Extended, mut best: Place) -> Result<Place, FilterError> {
+    let kinked = extended.terms.last().map(|term| term.kinked());
+    let dt = own.problem.records[0].drive().dt();
+    for i in kinked.unwrap_or_default() {
+        let entry = extended.entries[i];
+        let held = own.problem.holding(|j| j == entry);
+        for samples in moves(&own.problem).rev() {
+            for by in [-samples * dt, samples * dt] {
+                while let Some(better) = moved(&held, &best, entry, by)? {
+                    best = better;
+                }
+            }
+        }
+    }
+    Ok(best)
+}
+
+/// The place with an entry moved, the others having answered; `None` where it is no better.
+fn moved(
+    held: &Problem,
+    from: &Place,
+    entry: usize,
+    by: f64,
+) -> Result<Option<Place>, FilterError> {
+    let mut theta = from.0.clone();
+    theta[entry] = held.axes[entry].bounds.clamp(theta[entry] + by);
+    let end = reach(held, &theta, SEARCH.answers)?;
+    let better = end.filter(|end| end.objective > from.1 + held.done());
+    Ok(better.map(|end| (end.theta, end.objective)))
+}
+
+/// Moves of a time or a delay in samples, each twice the one before, up to a quarter of the distance between the times that are tried first.
+fn moves(problem: &Problem) -> impl DoubleEndedIterator<Item = f64> {
+    let longest = 0.25 * problem.records[0].samples() as f64 / (TERM.times + 1) as f64;
+    let doublings = (longest / SEARCH.first_move).log2().max(1.0) as i32;
+    (0..=doublings).map(|doubling| SEARCH.first_move * 2f64.powi(doubling))
 }
 
 /// θ of the twin and magnitudes with each time or delay moved.
@@ -146,19 +196,63 @@ fn nearby(found: &Explanation, term: &Term) -> Vec<Start> {
     else {
         return vec![];
     };
-    let record = &model.problem.records[0];
-    let longest = 0.25 * record.samples() as f64 / (TERM.times + 1) as f64;
-    let moves: Vec<f64> =
-        std::iter::successors(Some(SEARCH.first_move), |samples| Some(2.0 * samples))
-            .take_while(|samples| *samples <= longest.max(2.0 * SEARCH.first_move))
-            .collect();
+    let dt = model.problem.records[0].drive().dt();
     let mut all = vec![];
     for i in term.kinked() {
-        for samples in moves.iter().flat_map(|samples| [-samples, *samples]) {
+        for samples in moves(&model.problem).flat_map(|samples| [-samples, samples]) {
             let mut m = m.clone();
-            m[i] += samples * record.drive().dt();
+            m[i] += samples * dt;
             all.push((theta.clone(), m));
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::fixture::{fitted, record, tanks};
+    use crate::effect::{Catalogue, augment};
+    use std::sync::Arc;
+
+    /// A step that ended three samples before its time, far below another effect: it was left there, several nats short.
+    #[test]
+    fn an_effect_far_below_another_finds_its_time() {
+        let study = tanks(150);
+        let effect = Catalogue::default().effect("parameter-step", "k3").unwrap();
+        let twin = augment(study.twin().clone(), vec![effect]).unwrap();
+        let truth = [study.twin().parameters().centre(), vec![-0.4, 257.0]].concat();
+        let (model, terms) = fitted(&study, &[record(&study, &twin, &truth, 3)]);
+        let of = |key: &str| terms.iter().find(|term| term.key() == key).unwrap();
+        let (step, bias) = (of("parameter-step@k3"), of("sensor-bias@sensor"));
+        let ended = |term: &Arc<Term>, m: &[f64]| {
+            let extended = model.extend(term).unwrap();
+            let held = extended
+                .problem
+                .holding(|j| extended.entries[1..].contains(&j));
+            let end = climb(&held, &model.beside(&extended, m), 40)
+                .unwrap()
+                .unwrap();
+            Explanation::of(extended.fitted(model.base.clone(), end).unwrap())
+        };
+        let found = ended(step, &[-0.4, 245.0]);
+        let floor = model.log_evidence;
+        assert!(
+            found.log_z > floor + SEARCH.null_like,
+            "{}",
+            found.log_z - floor
+        );
+        let mut best = ended(bias, &[0.01]);
+        best.log_z = found.log_z + 50.0;
+        let mut all = [best, found.clone()];
+        leave_valleys(&model, &mut all, floor).unwrap();
+        let time = all[1].magnitudes().unwrap()[1];
+        assert!((time - 257.0).abs() < 4.0, "{time}");
+        assert!(
+            all[1].log_z > found.log_z + 3.0,
+            "{} {}",
+            all[1].log_z,
+            found.log_z
+        );
+    }
 }

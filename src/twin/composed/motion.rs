@@ -17,7 +17,7 @@ impl Composed {
         self.resolved(now, |now| self.rates(now, x, dx));
     }
 
-    /// Constrains points after a step, before their boxes.
+    /// Constrains points after a step, before their boxes. Parameters that follow states are those of the first point.
     pub fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
         self.resolved(now, |now| self.bound(now, None, x));
     }
@@ -108,7 +108,7 @@ impl Composed {
                 }
             }
         }
-        self.each_inside((now, own), x, |own, x| {
+        self.all_inside((now, own), x, |own, x| {
             self.own.constrain_points(own, at, x)
         });
     }
@@ -122,7 +122,7 @@ impl Composed {
             self.remember_signals(now, x);
         }
         if self.parts.moves(now, 0) {
-            self.each_inside((now, own), x, |own, x| self.own.update_points(own, at, x));
+            self.all_inside((now, own), x, |own, x| self.own.update_points(own, at, x));
         }
         if !self.parts.acts.in_disturbances {
             return;
@@ -137,23 +137,21 @@ impl Composed {
         }
     }
 
-    /// Changes points, θ being as it is beside the states before; the twin's own time and θ may be known.
+    /// Changes points, θ being as it is beside the first of them before; the twin's own time and θ may be known.
     #[inline]
-    fn each_inside(
+    fn all_inside(
         &self,
         (now, own): (&Now<'_>, Option<&Now<'_>>),
         x: &mut [f64],
         change: impl Fn(&Now<'_>, &mut [f64]),
     ) {
-        if let Some(own) = own {
-            return change(own, x);
-        }
-        if !self.parts.acts.by_states {
-            return self.inside(now, None, |own| change(own, x));
-        }
-        for x in x.chunks_exact_mut(self.states().max(1)) {
-            let seen = Theta::from_slice(x);
-            self.inside(now, Some(&seen), |own| change(own, x));
+        match own {
+            Some(own) => change(own, x),
+            None if self.parts.acts.by_states => {
+                let centre = Theta::from_slice(&x[..self.states()]);
+                self.inside(now, Some(&centre), |own| change(own, x));
+            }
+            None => self.inside(now, None, |own| change(own, x)),
         }
     }
 
