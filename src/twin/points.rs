@@ -166,7 +166,7 @@ impl Points<'_> {
 /// Value of state j in the point whose state i is shifted.
 #[inline(always)]
 fn shifted_value(centre: &[f64], (i, shift): (usize, f64), j: usize) -> f64 {
-    centre[j] + if j == i { shift } else { 0.0 }
+    if j == i { centre[j] + shift } else { centre[j] }
 }
 
 /// Carries one point after the other, the equations inline: for twins that users write.

@@ -46,7 +46,6 @@ fn again(
         return Ok(None);
     };
     let term = found.last();
-    let extended = model.extend(term)?;
     let alike = (before.iter())
         .filter(|other| other.log_z > least && other.last().shape().as_ref() == Some(&shape))
         .filter_map(|other| Some((other.own_theta()?, other.magnitudes()?)));
@@ -60,14 +59,22 @@ fn again(
         starts.push((theta, m));
     }
     let is_beaten = !starts.is_empty();
-    // One sample beside its time an effect may be a dozen nats short: none is called worse before it has the best time in reach.
+    if !is_beaten && found.log_z <= worth {
+        return Ok(None);
+    }
+    let extended = model.extend(term)?;
+    // One sample beside its time an effect may be a dozen nats short: none is called worse before it has the best time in reach. Of a black box
+    // each look costs an ensemble.
+    let is_cheap = !own.problem.is_simulated();
     if found.log_z > least {
         starts.extend(nearby(found, term));
-    } else if found.log_z > worth && !own.problem.is_simulated() {
-        starts.extend(at_another_time(own, &extended)?);
+    } else if found.log_z > worth && is_cheap {
+        starts.extend(at_another_time(own, &extended, term)?);
     }
-    if is_beaten && let Some(place) = between(own, &extended)? {
-        let place = at_its_time(own, &extended, place)?;
+    if is_beaten && let Some(mut place) = between(own, &extended, term)? {
+        if is_cheap {
+            place = at_its_time(own, &extended, term, place)?;
+        }
         starts.push(start_of(own, &extended, place));
     }
     let mut best = begun_again(model, found, &starts)?;
@@ -117,8 +124,8 @@ fn begun_again(
 
 /// The best of times closer together than those tried first, θ and the size having answered each; `None` for a law without a time, or
 /// with several.
-fn between(own: &Model, extended: &Extended) -> Result<Option<Place>, FilterError> {
-    let Some(&[time]) = extended.terms.last().map(|term| term.times()).as_deref() else {
+fn between(own: &Model, extended: &Extended, term: &Term) -> Result<Option<Place>, FilterError> {
+    let &[time] = &term.times()[..] else {
         return Ok(None);
     };
     let time = extended.entries[time];
@@ -139,9 +146,13 @@ fn between(own: &Model, extended: &Extended) -> Result<Option<Place>, FilterErro
 }
 
 /// A better time or delay of a fit than its own; `None` where there is none in reach.
-fn at_another_time(own: &Model, extended: &Extended) -> Result<Option<Start>, FilterError> {
+fn at_another_time(
+    own: &Model,
+    extended: &Extended,
+    term: &Term,
+) -> Result<Option<Start>, FilterError> {
     let here = own.fitted.objective;
-    let place = at_its_time(own, extended, (own.fitted.theta.clone(), here))?;
+    let place = at_its_time(own, extended, term, (own.fitted.theta.clone(), here))?;
     Ok((place.1 > here).then(|| start_of(own, extended, place)))
 }
 
@@ -150,13 +161,19 @@ fn start_of(own: &Model, extended: &Extended, (theta, _): Place) -> Start {
     (theta[..own.base.parameters().len()].to_vec(), m)
 }
 
-/// The place that ever shorter moves of each time or delay lead to, θ and the size having answered each.
-fn at_its_time(own: &Model, extended: &Extended, mut best: Place) -> Result<Place, FilterError> {
-    let kinked = extended.terms.last().map(|term| term.kinked());
+/// The place that moves of each time or delay lead to, the longest first, each as long as it gains; all others answer.
+fn at_its_time(
+    own: &Model,
+    extended: &Extended,
+    term: &Term,
+    mut best: Place,
+) -> Result<Place, FilterError> {
     let dt = own.problem.records[0].drive().dt();
-    for i in kinked.unwrap_or_default() {
+    for i in term.kinked() {
         let entry = extended.entries[i];
         let held = own.problem.holding(|j| j == entry);
+        // Others have to answer here, too, or their answers pass for those to a move.
+        best = moved(&held, &best, entry, 0.0)?.unwrap_or(best);
         for samples in moves(&own.problem).rev() {
             for by in [-samples * dt, samples * dt] {
                 while let Some(better) = moved(&held, &best, entry, by)? {
@@ -168,7 +185,7 @@ fn at_its_time(own: &Model, extended: &Extended, mut best: Place) -> Result<Plac
     Ok(best)
 }
 
-/// The place with an entry moved, the others having answered; `None` where it is no better.
+/// The place with an entry moved, the others having answered; `None` where it is no better, or the entry at its bound.
 fn moved(
     held: &Problem,
     from: &Place,
@@ -176,7 +193,11 @@ fn moved(
     by: f64,
 ) -> Result<Option<Place>, FilterError> {
     let mut theta = from.0.clone();
-    theta[entry] = held.axes[entry].bounds.clamp(theta[entry] + by);
+    let there = held.axes[entry].bounds.clamp(theta[entry] + by);
+    let before = std::mem::replace(&mut theta[entry], there);
+    if by != 0.0 && there == before {
+        return Ok(None);
+    }
     let end = reach(held, &theta, SEARCH.answers)?;
     let better = end.filter(|end| end.objective > from.1 + held.done());
     Ok(better.map(|end| (end.theta, end.objective)))

@@ -17,7 +17,8 @@ impl Composed {
         self.resolved(now, |now| self.rates(now, x, dx));
     }
 
-    /// Constrains points after a step, before their boxes. Parameters that follow states are those of the first point.
+    /// Constrains points after a step, before their boxes. Parameters that follow states are those of the first point, or, where a disturbance
+    /// moves one, of each.
     pub fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
         self.resolved(now, |now| self.bound(now, None, x));
     }
@@ -137,7 +138,8 @@ impl Composed {
         }
     }
 
-    /// Changes points, θ being as it is beside the first of them before; the twin's own time and θ may be known.
+    /// Changes points, the twin's own time and θ being known, or those beside the states before: of the first point alone, which a call each would
+    /// cost most of a step; a disturbance, which the filter learns from what the points differ in, has those of each.
     #[inline]
     fn all_inside(
         &self,
@@ -145,13 +147,16 @@ impl Composed {
         x: &mut [f64],
         change: impl Fn(&Now<'_>, &mut [f64]),
     ) {
-        match own {
-            Some(own) => change(own, x),
-            None if self.parts.acts.by_states => {
-                let centre = Theta::from_slice(&x[..self.states()]);
-                self.inside(now, Some(&centre), |own| change(own, x));
-            }
-            None => self.inside(now, None, |own| change(own, x)),
+        let n = self.states().max(1);
+        let together = match (own, self.parts.acts.by_states) {
+            (Some(own), _) => return change(own, x),
+            (None, false) => return self.inside(now, None, |own| change(own, x)),
+            (None, true) if self.parts.acts.in_disturbances => n,
+            (None, true) => x.len().max(1),
+        };
+        for x in x.chunks_mut(together) {
+            let seen = Theta::from_slice(&x[..n.min(x.len())]);
+            self.inside(now, Some(&seen), |own| change(own, x));
         }
     }
 
