@@ -1,12 +1,13 @@
 //! Motion of composed equations, and parts together.
 
 use crate::effect::{Catalogue, augment};
+use crate::hypothesis::entry::disturbed;
 use crate::likelihood::kalman::{FilterSettings, Kalman};
 use crate::math::Lanes;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{
-    Adaptation, Hold, Integrator, Interval, LanePlaces, Noise, NoiseLevel, Now, Outline, Parameter,
-    StartLevel, StateSpace, Stepping, Twin, adapt, fix,
+    Adaptation, Entry, Hold, Integrator, Interval, LanePlaces, Noise, NoiseLevel, Now, Outline,
+    Parameter, StartLevel, StateSpace, Stepping, Twin, adapt, fix,
 };
 use crate::twins::CascadedTanks;
 
@@ -265,4 +266,37 @@ fn noise_is_the_same_side_by_side() {
             }
         }
     }
+}
+
+/// ẋ = u up to a brim, which is a parameter that nothing else depends on.
+struct Brimming;
+impl StateSpace for Brimming {
+    fn outline(&self) -> Outline {
+        Outline::new()
+            .parameter(Parameter::new("brim", "m", 0.5, 2.0))
+            .state("x", "m")
+            .input("u", "m/s")
+            .output("y", "m")
+    }
+    fn drift(&self, now: &Now<'_>, _: &[f64], dx: &mut [f64]) {
+        dx[0] = now.u[0];
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y[0] = x[0];
+    }
+    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
+        x[0] = x[0].min(now.theta[0]);
+    }
+}
+
+/// A filter learns a disturbance from what its points differ in: each has the brim of its own.
+#[test]
+fn points_have_their_own_disturbances_in_constraints() {
+    let twin = disturbed(&Twin::new(Brimming), Entry::Parameter(0), 0.9);
+    let theta = [1.0, 0.2];
+    let mut points = [2.0, 0.0, 2.0, 0.5, 2.0, -0.5];
+    let now = Now::new(0.0, 1.0, &[1.0], &theta);
+    twin.equations().unwrap().constrain(&now, &mut points);
+    let brims = [0.0, 0.5, -0.5].map(f64::exp);
+    assert_eq!([points[0], points[2], points[4]], brims);
 }
