@@ -77,12 +77,12 @@ fn again(
         }
         starts.push(start_of(own, &extended, place));
     }
-    let mut best = begun_again(model, found, &starts)?;
+    let mut best = begun_again(model, &extended, found, &starts)?;
     for _ in 1..SEARCH.rounds {
         let Some(old) = best.as_ref().filter(|old| old.log_z > least) else {
             break;
         };
-        let next = begun_again(model, old, &nearby(old, term))?;
+        let next = begun_again(model, &extended, old, &nearby(old, term))?;
         match next.filter(|next| next.log_z > old.log_z + SEARCH.better) {
             Some(next) => best = Some(next),
             None => break,
@@ -94,16 +94,16 @@ fn again(
 /// The best fit from these θ and magnitudes; `None` where none is better than its own.
 fn begun_again(
     model: &Model,
+    extended: &Extended,
     found: &Explanation,
     starts: &[Start],
 ) -> Result<Option<Explanation>, FilterError> {
     let Some(own) = found.model.as_ref().filter(|_| !starts.is_empty()) else {
         return Ok(None);
     };
-    let extended = model.extend(found.last())?;
-    let settled = settling_last(&own.problem, &extended);
+    let settled = settling_last(&own.problem, extended);
     let from: Vec<Vec<f64>> = (starts.iter())
-        .map(|(theta, m)| settled(extended.from(theta, model.beside(&extended, m))))
+        .map(|(theta, m)| settled(extended.from(theta, model.beside(extended, m))))
         .collect::<Result<_, _>>()?;
     let all = reached(&own.problem, &from, SEARCH.begun_again)?;
     let better = |end: &&Reached| end.objective > own.fitted.objective;

@@ -138,8 +138,9 @@ impl Composed {
         }
     }
 
-    /// Changes points, the twin's own time and θ being known, or those beside the states before: of the first point alone, which a call each would
-    /// cost most of a step; a disturbance, which the filter learns from what the points differ in, has those of each.
+    /// Changes points at the twin's own time and θ, which may be known. Otherwise θ is as it is beside the first point, before the change: θ of
+    /// each costs more than the change. Where a disturbance moves θ, each point has its own, as a filter learns the disturbance from what
+    /// its points differ in.
     #[inline]
     fn all_inside(
         &self,
