@@ -20,6 +20,8 @@ pub(crate) struct Declared {
     pub estimated: BTreeSet<String>,
     /// Time that starts belong to, before the first row.
     pub begins: Option<f64>,
+    /// True where an input says what it is between samples, a dose apart.
+    pub holds: bool,
 }
 
 /// The noise of a state or an output.

@@ -231,9 +231,9 @@ impl Reader<'_> {
                     }
                 }
             };
+            self.declared.holds |= keys.contains_key("hold") && own != Hold::Impulse;
             holds.insert(entry.name.to_owned(), own);
         }
-        // A rule that all inputs have is asked of records; several are as they are declared.
         let doses = |hold: &Hold| *hold == Hold::Impulse;
         let mut others = holds.values().copied().filter(|hold| !doses(hold));
         let usual = others.next().unwrap_or_default();

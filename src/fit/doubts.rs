@@ -3,13 +3,14 @@
 use super::follow::Swallowed;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
-use crate::likelihood::StartElsewhere;
+use crate::likelihood::{StartElsewhere, rounded};
 use crate::math::{is_constant, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
 use crate::setting::{number, unit_suffix};
 use crate::twin::conformance::{StepLength, step_length};
 use crate::twin::{Hold, Side, Stepping, Twin};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 /// Code of a free run that diverges.
 pub(crate) const DIVERGES: &str = "free-run-diverges";
@@ -19,7 +20,7 @@ pub(crate) const STILL_OUTPUT: &str = "constant-output";
 pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 21] = [
+const REMEDIES: [(&str, &str); 22] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",
@@ -80,6 +81,10 @@ const REMEDIES: [(&str, &str); 21] = [
         "widen the prior and train again, or diagnose what the twin lacks",
     ),
     ("repeated-record", "give each record once"),
+    (
+        "rounded-readings",
+        "log more digits, or add the effect sensor-quantization, which rounds what the twin shows, too",
+    ),
     (
         "start-elsewhere",
         "declare the start of these records, or the time that it belongs to",
@@ -310,6 +315,21 @@ impl<'a> Doubts<'a> {
             told(output.without)
         );
         self.warn("process-noise", what);
+    }
+
+    /// Warns of readings that are rounded to more than their noise.
+    pub fn rounded(&mut self) {
+        let problem = self.problem;
+        let theta = problem.of_record(0, self.theta);
+        for (j, least) in rounded(&problem.twin, &problem.records, &theta) {
+            let output = &problem.twin.signals().outputs[j];
+            let [step, least] = [least * TAU.sqrt(), least].map(|v| number(three_digits(v)));
+            let (name, unit) = (&output.name, unit_suffix(&output.unit));
+            let what = format!(
+                "{name} moves in steps of {step}{unit}: its noise counts as {least}{unit}, whatever less is declared or fitted"
+            );
+            self.warn("rounded-readings", what);
+        }
     }
 
     /// Warns of channels that never move.

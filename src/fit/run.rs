@@ -103,6 +103,7 @@ pub(crate) fn run(
     doubts.bounds(&parameters, &noise_levels, &off);
     doubts.runs(&errors, by_step);
     doubts.swallowed(stages.of(None, || swallowed(&problem, &fitted, levels, &errors))?);
+    doubts.rounded();
     doubts.still();
     doubts.interrupted(stages.are_cut());
     Ok(Some(Fit {

@@ -27,9 +27,11 @@ pub(crate) fn distinct(outputs: &[f64]) -> Vec<(f64, usize)> {
     values
 }
 
-/// Step of rounded values: all distances are multiples of the least one, and there are few values or the step is none of digits.
+/// Step of rounded values: all distances are multiples of the least one, and there are few values, some of which repeat, or the step is none of
+/// digits. Missing values tell nothing.
 pub(crate) fn step_of(outputs: &[f64]) -> Option<f64> {
     let values = distinct(outputs);
+    let readings: usize = values.iter().map(|(_, count)| count).sum();
     if values.len() < 2 {
         return None;
     }
@@ -40,7 +42,7 @@ pub(crate) fn step_of(outputs: &[f64]) -> Option<f64> {
     let steps = (span / step).round();
     // All of them know the step better than two.
     let step = span / steps;
-    let fine = REPEATS * steps > outputs.len() as f64;
+    let fine = REPEATS * steps > readings as f64 || values.len() == readings;
     if fine && (values.len() < DISTINCT || is_of_digits(step)) {
         return None;
     }
@@ -86,5 +88,10 @@ mod tests {
         );
         assert_eq!(step_of(&[1.0; 50]), None);
         assert_eq!(step_of(&[]), None);
+        // Two readings are always one step apart, and three of many rows often a multiple.
+        assert_eq!(step_of(&[0.9895, 0.6367]), None);
+        let mut sparse = vec![f64::NAN; 300];
+        (sparse[20], sparse[150], sparse[280]) = (0.25, 0.75, 2.25);
+        assert_eq!(step_of(&sparse), None);
     }
 }

@@ -253,6 +253,16 @@ mod tests {
             [states]\nh = { rate = 'u - k*h', start = 1.0 }\n[inputs]\nu = {}\n\
             [outputs]\ny = { value = 'h', noise = 0.02 }\n[record]\nhold = 'linear'\n";
         let parse = |text: &str| StudyFile::parse(text, "s.toml".as_ref()).unwrap();
+        for (own, asks) in [
+            ("", true),
+            ("hold = 'nearest'", false),
+            ("hold = 'impulse'", true),
+        ] {
+            let of_input = text.replace("u = {}", &format!("u = {{ {own} }}"));
+            let of_input = of_input.replace("[record]\nhold = 'linear'\n", "");
+            let study = Study::of_file(&parse(&of_input)).unwrap();
+            assert_eq!(study.asks_hold(), asks, "{own}");
+        }
         let file = parse(text);
         let served = Study::of_file_with(&file, file.own_equations().unwrap().clone());
         for study in [Study::of_file(&file).unwrap(), served.unwrap()] {

@@ -172,9 +172,9 @@ impl Study {
         StudyError::NoFit { cause }
     }
 
-    /// Returns whether the records say how inputs move between samples: the study's file does not.
+    /// Returns whether the records say how inputs move between samples: the study's file does not, neither for all nor for one.
     pub(crate) fn asks_hold(&self) -> bool {
-        self.file.record.hold.or(self.hold).is_none()
+        self.file.record.hold.or(self.hold).is_none() && !self.declared.holds
     }
 
     /// The twin with other substeps and another rule for inputs; `None` for a black box.

@@ -62,6 +62,25 @@ pub(crate) fn start_elsewhere(
     Starts::of(twin, records, beliefs, &theta).elsewhere
 }
 
+/// Outputs that are less noisy than what their readings are rounded to, with the least noise that counts: q/√2π.
+pub(crate) fn rounded(twin: &Twin, records: &[Record], theta: &[f64]) -> Vec<(usize, f64)> {
+    let Some(twin) = twin.equations() else {
+        return vec![];
+    };
+    let (own, levels) = (
+        twin.rounding(theta),
+        declared_levels(twin, records, theta, 1.0),
+    );
+    let least = |j: usize| {
+        let cells = records.iter().map(|record| record.cells()[j].sqrt());
+        cells.fold(0.0, f64::max)
+    };
+    let levels = levels.measurement.into_iter().enumerate();
+    let quiet =
+        levels.filter(|(j, level)| *level < least(*j) && !own.get(*j).is_some_and(|q| *q > 0.0));
+    quiet.map(|(j, _)| (j, least(j))).collect()
+}
+
 /// The twin with these noise levels in place of its own; all else stays, its start too. Levels by state, per √s, or by output; each run draws
 /// one of several lists. A black box stays as it is.
 pub(crate) fn with_levels(

@@ -11,7 +11,7 @@ const QUOTED: usize = 160;
 /// Longest message of a parser, in characters: it may list what it knows.
 const MESSAGE: usize = 2000;
 /// Words of parsers, and those of their readers.
-const WORDS: [(&str, &str); 19] = [
+const WORDS: [(&str, &str); 20] = [
     (
         " as i128, expected any valid TOML value",
         ", which has too many digits",
@@ -31,7 +31,11 @@ const WORDS: [(&str, &str); 19] = [
         "expected an array of length 2",
         "expected two numbers, [low, high]",
     ),
-    ("wanted string or table", "expected a text or a table"),
+    ("wanted string or table", "expected a text"),
+    (
+        "wanted exactly 1 element, more than 1 element",
+        "expected a text, found a table",
+    ),
     ("unknown field", "unknown key"),
     ("missing field", "missing key"),
     ("unknown variant", "unknown value"),

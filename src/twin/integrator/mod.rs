@@ -5,13 +5,13 @@ mod event;
 mod event_calls;
 mod event_memory;
 mod eventful;
+mod jump;
 mod limits;
 mod pair;
 mod path;
 mod rosenbrock;
 mod rule;
 mod schedule;
-mod slide;
 mod spline;
 #[cfg(test)]
 mod tests;

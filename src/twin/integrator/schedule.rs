@@ -2,11 +2,11 @@
 //! function for all of them, and for all θ of the passes that go side by side.
 
 use super::event_calls::{EventsOfWay, StepBy};
+use super::jump::{JumpsSeen, step_with_jumps};
 use super::pair::{self, ExplicitPair};
 use super::path::{Path, Stretch};
 use super::rosenbrock::{self, Rosenbrock};
 use super::rule::{Integrator, MOST_SUBSTEPS, Stepping};
-use super::slide::slide;
 use super::watch::EventWatch;
 use crate::math::three_digits;
 use crate::setting::number;
@@ -26,10 +26,9 @@ const JUMPS: [f64; 2] = [2.0, 16.0];
 /// gives up before a jump that all meet at one time is located, twice as many cost twice. Of a single run [`MANY`] times as many, as a jump is
 /// located in some thirty.
 const FEW: usize = 8;
-/// Least number of steps of one length in a sample where rates jump again and again, as dry friction does at rest: the time of a jump is known
-/// to a fraction of a step. With a quarter of them the evidence of dry friction in a pendulum came out twelve nats low; twice as many halve what is
-/// left, one nat.
-const EVEN: usize = 32;
+/// Least number of steps of one length in a sample where rates jump again and again, as dry friction does: jumps are met within a step, all else has
+/// its second order.
+const EVEN: usize = 8;
 /// Least factor in the number of steps by which the implicit method wins: what its steps cost more.
 const WORTH: f64 = 4.0;
 
@@ -149,9 +148,8 @@ pub(super) struct SubstepSchedule {
     sizes: Vec<f64>,
     /// `true` where rates jump in this sample: steps are then of one length, and no high order is of use.
     is_even: bool,
-    /// `true` where one run takes steps of one length: then what jumps of rates hold stays there. Points of a filter come off such a place with every
-    /// row, and finding it for each would cost ten times what their steps do.
-    is_sliding: bool,
+    /// Where rates have jumped in such steps.
+    jumps_seen: JumpsSeen,
     explicit: ExplicitPair,
     implicit: Rosenbrock,
     buffers: ScheduleBuffers,
@@ -191,7 +189,7 @@ impl SubstepSchedule {
             next: f64::INFINITY,
             sizes: vec![0.0; states],
             is_even: false,
-            is_sliding: false,
+            jumps_seen: JumpsSeen::default(),
             explicit: ExplicitPair::default(),
             implicit: Rosenbrock::default(),
             buffers: ScheduleBuffers::default(),
@@ -271,10 +269,7 @@ impl SubstepSchedule {
             true => self.implicit.step(path, of, (sizes, x), None),
             false => self.explicit.midpoint_step(path, of, x),
         };
-        match self.is_sliding {
-            true => slide(path, of, (n, x), &mut step),
-            false => step(path, of, x),
-        }
+        step_with_jumps(path, of, (n, x, &mut self.jumps_seen), &mut step);
     }
 
     /// Chooses the method and the substeps of this way, and takes them.
@@ -288,8 +283,8 @@ impl SubstepSchedule {
         let mut buffers = std::mem::take(&mut self.buffers);
         buffers.begin(x, &self.sizes);
         let was_rough = std::mem::take(&mut self.is_even);
-        self.is_sliding = false;
-        let begins_rough = was_rough && self.jumps(path, x, 0.0, [1.0 / EVEN as f64, 1.0]);
+        let begins_rough =
+            was_rough && self.jumps(path, x, 0.0, [1.0 / even_steps(path) as f64, 1.0]);
         let most = match self.may_change && !self.is_implicit {
             true => MANY,
             false => usize::MAX,
@@ -312,7 +307,6 @@ impl SubstepSchedule {
         }
         if matches!(outcome, SampleSteps::Rough) {
             buffers.undo(x, &mut self.sizes);
-            self.is_sliding = !is_followed;
             self.take_even_steps(path, x, (events, &mut buffers.trial));
         }
         self.buffers = buffers;
@@ -475,7 +469,7 @@ impl SubstepSchedule {
     ) {
         // Where rates are fast besides, as many as the smooth samples before took.
         let smooth = (path.now.dt / self.next).ceil() as usize;
-        let least = (EVEN * self.least).min(MOST_SUBSTEPS);
+        let least = (even_steps(path) * self.least).min(MOST_SUBSTEPS);
         let steps = smooth.clamp(least, MOST_SUBSTEPS + self.spare);
         self.spare -= steps.saturating_sub(MOST_SUBSTEPS);
         let longest = 1.0 / steps as f64;
@@ -525,6 +519,15 @@ impl SubstepSchedule {
             }
         }
         largest
+    }
+}
+
+/// Least number of steps of one length. Limits of states act at the ends of steps, a point is late there by up to one: with a quarter of these a
+/// level that turns at its limit ends half a hundredth of its range off.
+fn even_steps(path: &Path<'_, '_>) -> usize {
+    match path.limits {
+        Some(_) => 4 * EVEN,
+        None => EVEN,
     }
 }
 
