@@ -150,7 +150,13 @@ impl Library<'_> {
             term.axes.push(axis);
         }
         let scales = matches!(term.axes[0].evidence, EvidencePrior::Magnitude { .. });
-        let small = starts(&grids, scales);
+        let thresholds: Vec<usize> = (0..free.len())
+            .filter(|&i| free[i].is_threshold())
+            .collect();
+        let small = match thresholds.len() > 1 && !is_own {
+            true => at_like_levels(&grids, &thresholds),
+            false => starts(&grids, scales),
+        };
         if scales && first.limits.is_finite() {
             // A size between two ends is as likely large, where the twin folds: from nothing, no slope leads there.
             let (low, width) = (first.limits.low(), first.limits.width());
@@ -215,7 +221,7 @@ impl Library<'_> {
     }
 }
 
-/// Magnitudes that are off in each way to use an effect: of several thresholds, one is used at a time.
+/// Magnitudes that are off in each way to use an effect: of several thresholds, each is used alone, and all together.
 fn ways(effect: &Effect, mark: &OutputMark) -> Vec<Vec<usize>> {
     let magnitudes = effect.magnitudes();
     if let OutputMark::Present(m) = mark {
@@ -228,6 +234,7 @@ fn ways(effect: &Effect, mark: &OutputMark) -> Vec<Vec<usize>> {
         0 | 1 => vec![vec![]],
         _ => (thresholds.iter())
             .map(|i| thresholds.iter().copied().filter(|j| j != i).collect())
+            .chain([vec![]])
             .collect(),
     }
 }
@@ -261,6 +268,23 @@ fn marked(term: &mut Term, shown: &[f64], values: &[f64]) {
         false => TERM.mark_present,
     };
     term.axes.iter_mut().for_each(|axis| axis.held = true);
+}
+
+/// Starts of an effect with several thresholds: these let the same share of the signal pass, each on its side.
+fn at_like_levels(grids: &[Vec<f64>], thresholds: &[usize]) -> Vec<Start> {
+    let levels = thresholds
+        .iter()
+        .map(|&i| grids[i].len())
+        .min()
+        .unwrap_or(0);
+    let at = |level: usize| -> Vec<Start> {
+        let mut grids = grids.to_vec();
+        for &i in thresholds {
+            grids[i] = vec![grids[i][level]];
+        }
+        starts(&grids, false)
+    };
+    (0..levels).flat_map(at).collect()
 }
 
 /// Starts at every combination of one value of each list.

@@ -2,8 +2,8 @@
 
 /// Samples for each multiple of the step within the signal's range, at least, where the step is one of digits: files round, too.
 const REPEATS: f64 = 2.0;
-/// Distinct values that tell a step from chance.
-const DISTINCT: usize = 8;
+/// Readings, and distinct values where none repeats, that tell a step from chance.
+const ENOUGH: usize = 8;
 /// Largest distance of a rounded value from a multiple of the step, in steps.
 const TOLERANCE: f64 = 0.01;
 
@@ -27,8 +27,8 @@ pub(crate) fn distinct(outputs: &[f64]) -> Vec<(f64, usize)> {
     values
 }
 
-/// Step of rounded values: all distances are multiples of the least one, and there are few values, some of which repeat, or the step is none of
-/// digits. Missing values tell nothing.
+/// Step of rounded values: all distances are multiples of the least one, and there are few values, which repeat, or the step is none of digits. Missing
+/// values tell nothing.
 pub(crate) fn step_of(outputs: &[f64]) -> Option<f64> {
     let values = distinct(outputs);
     let readings: usize = values.iter().map(|(_, count)| count).sum();
@@ -42,8 +42,8 @@ pub(crate) fn step_of(outputs: &[f64]) -> Option<f64> {
     let steps = (span / step).round();
     // All of them know the step better than two.
     let step = span / steps;
-    let fine = REPEATS * steps > readings as f64 || values.len() == readings;
-    if fine && (values.len() < DISTINCT || is_of_digits(step)) {
+    let fine = REPEATS * steps > readings as f64;
+    if readings < ENOUGH || fine && (values.len() < ENOUGH || is_of_digits(step)) {
         return None;
     }
     let low = values[0].0;
@@ -89,7 +89,9 @@ mod tests {
         assert_eq!(step_of(&[1.0; 50]), None);
         assert_eq!(step_of(&[]), None);
         // Two readings are always one step apart, and three of many rows often a multiple.
-        assert_eq!(step_of(&[0.9895, 0.6367]), None);
+        for few in [&[0.9895, 0.6367][..], &[0.1, 0.1, 0.5]] {
+            assert_eq!(step_of(few), None);
+        }
         let mut sparse = vec![f64::NAN; 300];
         (sparse[20], sparse[150], sparse[280]) = (0.25, 0.75, 2.25);
         assert_eq!(step_of(&sparse), None);

@@ -1,14 +1,17 @@
-//! Steps in which points meet jumps of rates: those that pass one, as a pendulum's dry friction where it turns round, and those that one holds, as
-//! dry friction at rest.
+//! Steps in which points meet jumps of rates: those that pass one, as dry friction where a motion turns round, and those that one holds, as dry
+//! friction at rest.
 //!
 //! ```text
-//! x(s) = x₀ + s·h·f_a                              is at the jump at s; f_a: rates on this side, f_b: rates behind it
-//! x(α) = x₀ + h·((1 − α)·f_a + α·f_b)              α = 1 − s where the point goes on from there; where f_b leads back, α is such that x(α) is at the jump
+//! x(s) = x₀ + h·(s·f_a + s²·g/2)              is at the jump at s; f_a: rates on this side, g: their change along the step, f_b: rates behind the jump
+//! x(α) = x₀ + h·((1 − α)·f_a + α·f_b)         α = 1 − s where the point goes on from there; where f_b leads back at once, x(α) is at the jump
 //! ```
 //!
-//! What jumps moves by that mean of both rates, all else takes the step beside it: the end of a step is a continuous function of its begin, whatever
-//! jumps between. Sides are told from the rates alone, shares are found by halves, or at once where a jump is met again where it was before. One
-//! jump is met after the other, so that two blocks come to rest each on its own. Where nothing jumps, the step stays as it is.
+//! What jumps moves by that mean of both rates, all else by its own and its slope. The end of a step is then a continuous function of its begin, to
+//! second order: a likelihood is smooth in what moves the points. Sides are told from the rates alone: how far they are off the line that they leave
+//! the begin on. Shares are found by halves, or at once where a jump is met again where it was before. A rate jumps once in a step; jumps of several
+//! rates are met one after the other, so that two blocks come to rest each on its own. Where an implicit rule is given, it takes the step.
+//!
+//! All rates of a step are those in its middle.
 //!
 //! Sources: Filippov, *Differential Equations with Discontinuous Righthand Sides* (1988), section 4; Acary and Brogliato, *Implicit Euler numerical
 //! scheme and chattering-free implementation of sliding mode systems*, Systems & Control Letters 59 (2010) 284–293.
@@ -17,13 +20,12 @@ use super::event_calls::StepBy;
 use super::path::{Path, Stretch};
 use smallvec::SmallVec;
 
-/// Width of a share that is found by halves, in 27 looks: derivatives by θ are differences of ways that are some 1e-6 of a step apart.
+/// Share to which looks by halves go on, 25 of them: derivatives by θ are differences of ways that are some 1e-6 of a step apart.
 const CLOSE: f64 = 1e-8;
-/// Distance of a rate in the middle from the mean of both ends, as a share of their difference, from which a jump is looked for. That of a jump
-/// is a half; twice as much would miss one beside a slope that changes the rate by as much, half of it looks where rates are merely curved.
-const BENT: f64 = 0.1;
+/// Share of a step that shows the slope of rates at its begin, and where they lead behind a jump. Half or twice of it show the same.
+const NEAR: f64 = 1e-3;
 
-/// The last place at which the rate of each state jumped: where the next point will meet it.
+/// The last place at which the rate of each state jumped: where the next point is thought to meet it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct JumpsSeen(Vec<JumpSeen>);
 
@@ -53,12 +55,19 @@ impl JumpsSeen {
 impl JumpSeen {
     /// Share at which the points of a bracket are where the rate jumped.
     fn share_on(&self, bracket: &Bracket, step: &Step<'_>) -> f64 {
-        let [first, last] = [0.0, 1.0].map(|share| bracket.state(self.by, share, step));
-        (self.at[self.by] - first) / (last - first)
+        let i = self.by;
+        let [first, last, bend] = bracket.ways.each_ref().map(|way| way[i]);
+        // σ·(r₁ − r₀) + σ²·g/2 = way
+        let (slope, way) = (
+            last - first,
+            (self.at[i] - bracket.state(i, 0.0, step)) / step.h,
+        );
+        let root = (slope * slope + 2.0 * bend * way).sqrt();
+        2.0 * way / (slope + root.copysign(slope))
     }
 
     /// Learns where it jumped now, unless that was known.
-    fn see(&mut self, bracket: &Bracket, step: &Step<'_>) {
+    fn learn(&mut self, bracket: &Bracket, step: &Step<'_>) {
         if (bracket.share() - self.share_on(bracket, step)).abs() <= 2.0 * CLOSE {
             return;
         }
@@ -77,41 +86,43 @@ impl JumpSeen {
 /// Numbers of one point.
 type Few = SmallVec<[f64; 4]>;
 
-/// Search for the place of a jump among the points x₀ + h·((1 − σ)·r₀ + σ·r₁).
+/// Search for the place of a jump among the points x₀ + h·((1 − σ)·r₀ + σ·r₁ + σ²·g/2).
 struct Bracket {
     /// Place of the point among all numbers.
     at: usize,
     /// Entry whose rate tells the sides.
     entry: usize,
-    /// r₀ and r₁.
-    ways: [Few; 2],
+    /// r₀, r₁ and g.
+    ways: [Few; 3],
     /// Rates at both ends.
     ends: [Few; 2],
+    /// What the rates at the end are off the line that they leave the begin on.
+    off: Few,
     /// Shares σ between which the jump is, and rates there.
     shares: [f64; 2],
     rates: [Few; 2],
-    /// Shares to be looked at first.
-    first: Few,
+    /// Shares to be looked at before others.
+    guesses: Few,
 }
 
 impl Bracket {
-    fn new((at, entry): (usize, usize), ways: [Few; 2], ends: [&[f64]; 2]) -> Self {
-        let ends = ends.map(Few::from_slice);
+    fn new((at, entry): (usize, usize), ways: [Few; 3], ends: [Few; 2], off: Few) -> Self {
         Self {
             at,
             entry,
             ways,
             rates: ends.clone(),
             ends,
+            off,
             shares: [0.0, 1.0],
-            first: Few::new(),
+            guesses: Few::new(),
         }
     }
 
     /// Looks at both sides of a share before others.
     fn guess(&mut self, share: f64) {
-        self.first
-            .extend([share - 2.0 * CLOSE, share + 2.0 * CLOSE]);
+        let beside = 2.0 * CLOSE;
+        self.guesses.extend([share - beside, share + beside]);
     }
 
     /// The middle of what is left.
@@ -122,7 +133,7 @@ impl Bracket {
     /// Share to look at next.
     fn next(&mut self) -> f64 {
         let [low, high] = self.shares;
-        while let Some(share) = self.first.pop() {
+        while let Some(share) = self.guesses.pop() {
             if low < share && share < high {
                 return share;
             }
@@ -130,10 +141,13 @@ impl Bracket {
         self.share()
     }
 
-    /// Learns the rates at a share.
+    /// Learns the rates at a share: before the jump they are on the line, behind it as far off as at the end. At a quarter of that the first of two
+    /// like jumps is behind.
     fn see(&mut self, share: f64, rates: &[f64]) {
-        let ends = [0, 1].map(|end: usize| self.ends[end][self.entry]);
-        let side = usize::from(is_last(rates[self.entry], ends));
+        let [first, last] = [0, 1].map(|end: usize| self.ends[end][self.entry]);
+        let off = self.off[self.entry];
+        let line = first + share * (last - first - off);
+        let side = usize::from((rates[self.entry] - line) / off > 0.25);
         self.shares[side] = share;
         self.rates[side].copy_from_slice(rates);
     }
@@ -142,24 +156,39 @@ impl Bracket {
         self.shares[1] - self.shares[0] <= 5.0 * CLOSE
     }
 
-    /// Returns whether a rate jumps there: it changes by half of what it does from end to end, or more.
+    /// Change of a rate at the jump.
+    fn change(&self, i: usize) -> f64 {
+        self.rates[1][i] - self.rates[0][i]
+    }
+
+    /// Returns whether a rate jumps there: by a quarter of what it is off at the end or more, and by more than a slope changes it there.
     fn jumps(&self, i: usize) -> bool {
-        let change = |of: &[Few; 2]| (of[1][i] - of[0][i]).abs();
-        self.is_found()
-            && change(&self.rates) > 0.0
-            && change(&self.rates) >= 0.5 * change(&self.ends)
+        let all = (self.ends[1][i] - self.ends[0][i]).abs();
+        let least = (0.25 * self.off[i].abs()).max(NEAR * all);
+        self.is_found() && self.change(i).abs() > least
     }
 
     /// Mean rate on the way to the jump and on from it, to where rates are these.
-    fn passed(&self, i: usize, end: &[f64]) -> f64 {
-        let [before, behind] = &self.rates;
+    fn passed(&self, i: usize, end: f64) -> f64 {
+        let (before, behind) = (self.rates[0][i], self.rates[1][i]);
         let share = self.share();
-        0.5 * (share * (self.ends[0][i] + before[i]) + (1.0 - share) * (behind[i] + end[i]))
+        0.5 * (share * (self.ends[0][i] + before) + (1.0 - share) * (behind + end))
+    }
+
+    /// The rate at the end of the step, from that a little behind the jump and the one found there: another jump on the way is not in it.
+    fn end(&self, i: usize, onward: f64, end: f64) -> f64 {
+        let behind = self.rates[1][i];
+        let expected = behind + (1.0 - self.share()) * (onward - behind) / NEAR;
+        match (end - expected).abs() < 0.5 * self.change(i).abs() {
+            true => end,
+            false => expected,
+        }
     }
 
     /// A rate of the way to a share.
     fn way(&self, share: f64, i: usize) -> f64 {
-        (1.0 - share) * self.ways[0][i] + share * self.ways[1][i]
+        let [first, last, bend] = self.ways.each_ref().map(|way| way[i]);
+        (1.0 - share) * first + share * (last + 0.5 * share * bend)
     }
 
     /// A state of the point at a share.
@@ -168,38 +197,39 @@ impl Bracket {
     }
 }
 
-/// Returns whether a rate is nearer to that of the last side.
-fn is_last(rate: f64, [first, last]: [f64; 2]) -> bool {
-    (rate - first) / (last - first) > 0.5
-}
-
-/// Carries points of `n` states each over a stretch by `step`, in which what jumps takes part by its mean.
+/// Carries points of `n` states each over a stretch, by their rates and the slopes of these or by an implicit rule; what jumps takes part by its mean.
 pub(super) fn step_with_jumps(
     path: &mut Path<'_, '_>,
     of: Stretch,
     (n, x, seen): (usize, &mut [f64], &mut JumpsSeen),
-    step: &mut StepBy<'_>,
+    implicit: Option<&mut StepBy<'_>>,
 ) {
     seen.begin(n);
     let begin = x.to_vec();
-    let whole = Step {
+    let step = Step {
         n,
         begin: &begin,
         h: path.seconds(of),
         of,
+        is_implicit: implicit.is_some(),
     };
     path.held.resize(x.len(), f64::NAN);
     let mut looked = vec![false; x.len()];
+    let mut ways = step.ways(path);
     for _ in 0..n {
-        let passing = whole.passing(path, seen, &mut looked);
+        let passing = step.passing(path, &ways, seen, &mut looked);
         if passing.is_empty() {
             break;
         }
-        for (i, mean) in whole.means(path, seen, &passing) {
+        for (i, mean) in step.means(path, seen, &passing) {
             path.held[i] = mean;
         }
+        ways = step.ways(path);
     }
-    step(path, of, x);
+    match implicit {
+        Some(implicit) => implicit(path, of, x),
+        None => x.copy_from_slice(&step.ahead(&ways, 1.0)),
+    }
     path.held.clear();
 }
 
@@ -210,32 +240,72 @@ struct Step<'s> {
     /// Seconds.
     h: f64,
     of: Stretch,
+    is_implicit: bool,
+}
+
+/// Ways of points through a step: x(s) = x₀ + h·(s·first + s²·bends/2).
+struct Ways {
+    /// Rates at the begin, and their slopes along the step.
+    first: Vec<f64>,
+    slopes: Vec<f64>,
+    /// The slopes, or nothing where rates are stiff: their change at the begin leads far off.
+    bends: Vec<f64>,
 }
 
 impl Step<'_> {
-    /// Where the rates of points are bent on their ways, searched for a jump: of each point one entry that was not looked at before.
+    /// Where points are at a share of the step.
+    fn ahead(&self, ways: &Ways, share: f64) -> Vec<f64> {
+        let ways = self.begin.iter().zip(&ways.first).zip(&ways.bends);
+        let ahead = |((x, rate), bend)| x + share * self.h * (rate + 0.5 * share * bend);
+        ways.map(ahead).collect()
+    }
+
+    fn ways(&self, path: &mut Path<'_, '_>) -> Ways {
+        let mut ways = Ways {
+            first: self.rates(path, self.begin),
+            slopes: vec![],
+            bends: vec![0.0; self.begin.len()],
+        };
+        let near = [NEAR, 2.0 * NEAR].map(|share| self.rates(path, &self.ahead(&ways, share)));
+        let rates = ways.first.iter().zip(&near[0]).zip(&near[1]);
+        ways.slopes = rates
+            .map(|((first, near), next)| slope([*first, *near, *next]))
+            .collect();
+        if !self.is_implicit {
+            ways.bends.clone_from(&ways.slopes);
+        }
+        ways
+    }
+
+    /// Where rates leave their line on the ways of points, searched for a jump: of each point one entry that was not looked at before.
     fn passing(
         &self,
         path: &mut Path<'_, '_>,
+        ways: &Ways,
         seen: &JumpsSeen,
         looked: &mut [bool],
     ) -> Vec<Bracket> {
         let n = self.n;
-        let first = self.rates(path, self.begin);
-        let [middle, last] = [0.5, 1.0].map(|share: f64| {
-            let ways = self.begin.iter().zip(&first);
-            let x: Vec<f64> = ways.map(|(x, rate)| x + share * self.h * rate).collect();
-            self.rates(path, &x)
-        });
+        let [middle, last] = [0.5, 1.0].map(|share| self.rates(path, &self.ahead(ways, share)));
         let mut passing = vec![];
         for at in (0..self.begin.len()).step_by(n) {
-            let [first, middle, last] = [&first, &middle, &last].map(|all| &all[at..at + n]);
-            let Some(entry) = bent([first, middle, last], &looked[at..at + n]) else {
+            let of_point = |all: &[f64]| Few::from_slice(&all[at..at + n]);
+            let rates = [&ways.first, &middle, &last].map(|all| of_point(all));
+            let off = |share: f64, of: &Few| -> Few {
+                let line = (at..at + n).map(|i| ways.first[i] + share * ways.slopes[i]);
+                of.iter()
+                    .zip(line)
+                    .map(|(rate, line)| rate - line)
+                    .collect()
+            };
+            let (middle, last) = (off(0.5, &rates[1]), off(1.0, &rates[2]));
+            let Some(entry) = bent(&rates, [&middle, &last], &looked[at..at + n]) else {
                 continue;
             };
             looked[at + entry] = true;
-            let ways = [Few::from_elem(0.0, n), Few::from_slice(first)];
-            let mut bracket = Bracket::new((at, entry), ways, [first, last]);
+            let [first, _, end] = rates;
+            let ways = [Few::from_elem(0.0, n), first.clone(), of_point(&ways.bends)];
+            let mut bracket = Bracket::new((at, entry), ways, [first, end], last);
             bracket.guess(seen.0[entry].share_on(&bracket, self));
             passing.push(bracket);
         }
@@ -251,34 +321,44 @@ impl Step<'_> {
         passing: &[Bracket],
     ) -> Vec<(usize, f64)> {
         let passing: Vec<&Bracket> = passing.iter().filter(|b| b.jumps(b.entry)).collect();
-        let mut ends = self.begin.to_vec();
+        let (mut onwards, mut ends) = (self.begin.to_vec(), self.begin.to_vec());
         for bracket in &passing {
-            seen.0[bracket.entry].see(bracket, self);
+            seen.0[bracket.entry].learn(bracket, self);
             for i in 0..self.n {
-                ends[bracket.at + i] += self.h * bracket.passed(i, &bracket.rates[1]);
+                let behind = bracket.rates[1][i];
+                let at = bracket.state(i, bracket.shares[1], self);
+                onwards[bracket.at + i] = at + NEAR * self.h * behind;
+                ends[bracket.at + i] += self.h * bracket.passed(i, behind);
             }
         }
-        let ends = self.rates(path, &ends);
-        let (mut means, mut leading_back) = (vec![], vec![]);
+        let [onwards, ends] = [onwards, ends].map(|x| self.rates(path, &x));
+        let (mut means, mut holding) = (vec![], vec![]);
         for bracket in passing {
             let (at, entry) = (bracket.at, bracket.entry);
             let [before, behind] = &bracket.rates;
-            if is_last(ends[at + entry], [behind[entry], before[entry]]) {
-                let ways = [bracket.ends[0].clone(), behind.clone()];
-                let mut bracket = Bracket::new((at, entry), ways, [behind, before]);
-                bracket.guess(seen.0[entry].share);
-                bracket.guess(seen.0[entry].share_on(&bracket, self));
-                leading_back.push(bracket);
-                continue;
+            let back = (onwards[at + entry] - behind[entry]) / -bracket.change(entry);
+            let jumping = (0..self.n).filter(|&i| bracket.jumps(i));
+            if back > 0.5 {
+                let straight = Few::from_elem(0.0, self.n);
+                let ways = [bracket.ends[0].clone(), behind.clone(), straight];
+                let off = (0..self.n).map(|i| -bracket.change(i)).collect();
+                let ends = [behind.clone(), before.clone()];
+                let mut line = Bracket::new((at, entry), ways, ends, off);
+                line.guess(seen.0[entry].share);
+                line.guess(seen.0[entry].share_on(&line, self));
+                holding.push((line, jumping.collect()));
+            } else {
+                let end = |i: usize| bracket.end(i, onwards[at + i], ends[at + i]);
+                means.extend(jumping.map(|i| (at + i, bracket.passed(i, end(i)))));
             }
-            let mean = |i: usize| (at + i, bracket.passed(i, &ends[at..]));
-            means.extend((0..self.n).filter(|&i| bracket.jumps(i)).map(mean));
         }
-        self.find(path, &mut leading_back);
-        for bracket in leading_back.iter().filter(|b| b.jumps(b.entry)) {
-            seen.0[bracket.entry].share = bracket.share();
-            let mean = |i: usize| (bracket.at + i, bracket.way(bracket.share(), i));
-            means.extend((0..self.n).filter(|&i| bracket.jumps(i)).map(mean));
+        let (mut lines, jumping): (Vec<Bracket>, Vec<Vec<usize>>) = holding.into_iter().unzip();
+        self.find(path, &mut lines);
+        for (line, jumping) in lines.iter().zip(jumping) {
+            // What jumps at the begin as well, but is held by another share, has its own bracket.
+            let held = jumping.into_iter().filter(|&i| line.jumps(i));
+            means.extend(held.map(|i| (line.at + i, line.way(line.share(), i))));
+            seen.0[line.entry].share = line.share();
         }
         means
     }
@@ -292,7 +372,7 @@ impl Step<'_> {
     /// Narrows brackets down, each call of the equations for all of them.
     fn find(&self, path: &mut Path<'_, '_>, brackets: &mut [Bracket]) {
         let mut x = self.begin.to_vec();
-        // Ends: each look halves what is left, but for those at guesses.
+        // Ends: looks beside guesses are few, and each other one halves what is left.
         loop {
             let mut shares = vec![];
             for bracket in brackets.iter_mut().filter(|b| !b.is_found()) {
@@ -314,18 +394,34 @@ impl Step<'_> {
     }
 }
 
-/// The entry, of those not looked at, whose rate in the middle is farthest off the mean of both ends, by its own size; `None` where none is as far
-/// as where one jumps.
-fn bent([first, middle, last]: [&[f64]; 3], looked: &[bool]) -> Option<usize> {
-    let off = |i: usize| (middle[i] - 0.5 * (first[i] + last[i])).abs();
-    let size = |i: usize| first[i].abs().max(middle[i].abs()).max(last[i].abs());
+/// Slope of a rate along a step, from its values at the begin and at two places near it: the smaller change, as a jump may be in the other.
+fn slope([first, near, beside]: [f64; 3]) -> f64 {
+    let changes = [near - first, beside - near];
+    match changes[0] * changes[1] > 0.0 {
+        true => changes[usize::from(changes[1].abs() < changes[0].abs())] / NEAR,
+        false => 0.0,
+    }
+}
+
+/// The entry, of those not looked at, whose rate is farthest off its line, by its own size, in another way than a curve is, a quarter as far in the middle as
+/// at the end: where one jumps, the middle is as far off as the end, or not at all.
+fn bent(
+    [first, half, end]: &[Few; 3],
+    [middle, last]: [&Few; 2],
+    looked: &[bool],
+) -> Option<usize> {
+    let size = |i: usize| first[i].abs().max(half[i].abs()).max(end[i].abs());
     (0..first.len())
-        .filter(|&i| !looked[i] && off(i) > BENT * (last[i] - first[i]).abs() + CLOSE * size(i))
-        .max_by(|&i, &j| (off(i) / size(i)).total_cmp(&(off(j) / size(j))))
+        .filter(|&i| {
+            let least = 0.2 * last[i].abs() + CLOSE * size(i);
+            !looked[i] && (middle[i] - 0.25 * last[i]).abs() > least
+        })
+        .max_by(|&i, &j| (last[i].abs() / size(i)).total_cmp(&(last[j].abs() / size(j))))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::{JumpsSeen, Path, Stretch, step_with_jumps};
     use crate::twin::Interval;
     use crate::twin::integrator::{Integrator, Now, Stepping, Workspace};
 
@@ -352,6 +448,79 @@ mod tests {
             });
         }
         x
+    }
+
+    /// One step of a point.
+    fn stepped<const N: usize>(
+        h: f64,
+        begin: [f64; N],
+        mut rates: impl FnMut(f64, &[f64], &mut [f64]),
+    ) -> [f64; N] {
+        let now = Now::new(0.0, h, &[], &[]);
+        let mut path = Path {
+            now: &now,
+            inputs: &mut [],
+            drift: &mut |now, x, dx| rates(now.t, x, dx),
+            breaks: &[],
+            edge: 0.0,
+            limits: None,
+            held: vec![],
+        };
+        let mut x = begin;
+        let of = Stretch {
+            from: 0.0,
+            length: 1.0,
+        };
+        let mut seen = JumpsSeen::default();
+        step_with_jumps(&mut path, of, (N, &mut x, &mut seen), None);
+        x
+    }
+
+    /// Where a step of 0.125 s ends is continuous in where it begins, and off by less than four squares of it: a sled that friction stops or lets through,
+    /// a spring that is met, and friction beside a damping that changes the rate by more.
+    #[test]
+    fn a_step_past_a_jump_is_continuous_in_its_begin() {
+        type Rates = fn(f64, &[f64], &mut [f64]);
+        let systems: [(&str, [f64; 2], [f64; 2], Rates); 4] = [
+            ("sled at rest", [0.0, -0.2], [0.0, 0.2], |_, x, dx| {
+                (dx[0], dx[1]) = (x[1], 0.2 - 0.7 * sign(x[1]));
+            }),
+            ("sled", [0.0, -0.4], [0.0, 0.4], |_, x, dx| {
+                (dx[0], dx[1]) = (x[1], 2.0 - 0.6 * sign(x[1]));
+            }),
+            ("spring", [0.9, 1.0], [1.1, 1.0], |_, x, dx| {
+                let spring = if x[0] > 1.0 { 4.0 } else { 0.0 };
+                (dx[0], dx[1]) = (x[1], -1.0 - spring);
+            }),
+            ("damped", [0.0, -0.2], [0.0, 0.2], |_, x, dx| {
+                (dx[0], dx[1]) = (x[1], 0.9 - x[1] - 0.1 * sign(x[1]));
+            }),
+        ];
+        let h = 0.125;
+        for (name, from, to, rates) in systems {
+            let mut last: Option<[f64; 2]> = None;
+            for k in 0..=4000 {
+                let share = f64::from(k) / 4000.0;
+                let begin = [0, 1].map(|i: usize| from[i] + share * (to[i] - from[i]));
+                let end = stepped(h, begin, rates);
+                let (mut exact, short) = (begin, h / 2000.0);
+                for _ in 0..if k % 40 == 0 { 2000 } else { 0 } {
+                    let mut dx = [0.0; 2];
+                    rates(0.0, &exact, &mut dx);
+                    (0..2).for_each(|i| exact[i] += short * dx[i]);
+                }
+                for i in 0..2 {
+                    let off = (end[i] - exact[i]).abs();
+                    assert!(
+                        k % 40 > 0 || off < 4.0 * h * h,
+                        "{name} {begin:?}: {end:?} {exact:?}"
+                    );
+                    let leap = last.map_or(0.0, |last| (end[i] - last[i]).abs());
+                    assert!(leap < 2e-3, "{name} {begin:?}: {i} leaps by {leap}");
+                }
+                last = Some(end);
+            }
+        }
     }
 
     fn sign(x: f64) -> f64 {

@@ -102,23 +102,6 @@ impl ExplicitPair {
         self.reach
     }
 
-    /// Carries points over a stretch by the slope at its middle, order 2: where rates jump, the other stages add nothing.
-    pub fn midpoint_step(&mut self, path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]) {
-        let (h, size) = (path.seconds(of), x.len());
-        self.stage.resize(size, 0.0);
-        let [first, middle, ..] = &mut self.slopes;
-        first.resize(size, 0.0);
-        middle.resize(size, 0.0);
-        path.rates(of, 0.0, x, first);
-        for ((stage, x), slope) in self.stage.iter_mut().zip(&*x).zip(&*first) {
-            *stage = x + 0.5 * h * slope;
-        }
-        path.rates(of, 0.5, &self.stage, middle);
-        for (x, slope) in x.iter_mut().zip(&*middle) {
-            *x += h * slope;
-        }
-    }
-
     /// Sets the stage to `x` and weighted slopes.
     fn shifted(&mut self, h: f64, weights: &[f64], x: &[f64]) {
         self.stage.copy_from_slice(x);

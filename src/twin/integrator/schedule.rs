@@ -264,12 +264,11 @@ impl SubstepSchedule {
                 false => self.explicit.step(path, of, x, errors),
             };
         }
-        let mut step = |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| match self.is_implicit
-        {
-            true => self.implicit.step(path, of, (sizes, x), None),
-            false => self.explicit.midpoint_step(path, of, x),
+        let mut implicit = |path: &mut Path<'_, '_>, of: Stretch, x: &mut [f64]| {
+            self.implicit.step(path, of, (sizes, x), None);
         };
-        step_with_jumps(path, of, (n, x, &mut self.jumps_seen), &mut step);
+        let implicit = (self.is_implicit).then_some(&mut implicit as &mut StepBy<'_>);
+        step_with_jumps(path, of, (n, x, &mut self.jumps_seen), implicit);
     }
 
     /// Chooses the method and the substeps of this way, and takes them.
@@ -283,8 +282,10 @@ impl SubstepSchedule {
         let mut buffers = std::mem::take(&mut self.buffers);
         buffers.begin(x, &self.sizes);
         let was_rough = std::mem::take(&mut self.is_even);
-        let begins_rough =
-            was_rough && self.jumps(path, x, 0.0, [1.0 / even_steps(path) as f64, 1.0]);
+        let begins_rough = was_rough && {
+            let shortest = 1.0 / self.even(path, x) as f64;
+            self.jumps(path, x, 0.0, [shortest, 1.0])
+        };
         let most = match self.may_change && !self.is_implicit {
             true => MANY,
             false => usize::MAX,
@@ -469,7 +470,7 @@ impl SubstepSchedule {
     ) {
         // Where rates are fast besides, as many as the smooth samples before took.
         let smooth = (path.now.dt / self.next).ceil() as usize;
-        let least = (even_steps(path) * self.least).min(MOST_SUBSTEPS);
+        let least = (self.even(path, x) * self.least).min(MOST_SUBSTEPS);
         let steps = smooth.clamp(least, MOST_SUBSTEPS + self.spare);
         self.spare -= steps.saturating_sub(MOST_SUBSTEPS);
         let longest = 1.0 / steps as f64;
@@ -488,6 +489,22 @@ impl SubstepSchedule {
             self.step(path, of, trial, None);
             let reached = if parts == 1.0 { end } else { from + of.length };
             from = self.keep(path, &mut events, (of, reached), (x, trial));
+        }
+    }
+
+    /// Least number of steps of one length: more where states have limits, which act at their ends, where jumps may move, which are looked for in the
+    /// middle of a step, and where states are much faster than these. With as few, a level that turns at its limit ends half a hundredth of its range off.
+    fn even(&self, path: &mut Path<'_, '_>, x: &[f64]) -> usize {
+        let [mut first, mut last] = [0.0, 1.0].map(|_| vec![0.0; x.len()]);
+        let way = Stretch {
+            from: 0.0,
+            length: 1.0,
+        };
+        path.rates(way, 0.0, x, &mut first);
+        path.rates(way, 1.0, x, &mut last);
+        match path.limits.is_some() || self.is_implicit || first != last {
+            true => 4 * EVEN,
+            false => EVEN,
         }
     }
 
@@ -519,15 +536,6 @@ impl SubstepSchedule {
             }
         }
         largest
-    }
-}
-
-/// Least number of steps of one length. Limits of states act at the ends of steps, a point is late there by up to one: with a quarter of these a
-/// level that turns at its limit ends half a hundredth of its range off.
-fn even_steps(path: &Path<'_, '_>) -> usize {
-    match path.limits {
-        Some(_) => 4 * EVEN,
-        None => EVEN,
     }
 }
 

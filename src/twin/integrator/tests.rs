@@ -413,8 +413,8 @@ fn points_that_friction_stops_take_steps_of_one_length() {
         }
     }
     let taken = work.steps_taken().unwrap();
-    assert_eq!((taken.implicit, taken.most), (0, 8), "{taken:?}");
-    assert!(taken.substeps > 20 * 8, "{taken:?}");
+    assert_eq!((taken.implicit, taken.most), (0, 32), "{taken:?}");
+    assert!(taken.substeps > 20 * 32, "{taken:?}");
 }
 
 /// An outflow by the root of a level that runs empty is steep, and not stiff.
