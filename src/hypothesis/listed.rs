@@ -270,13 +270,9 @@ fn marked(term: &mut Term, shown: &[f64], values: &[f64]) {
     term.axes.iter_mut().for_each(|axis| axis.held = true);
 }
 
-/// Starts of an effect with several thresholds: these let the same share of the signal pass, each on its side.
+/// Starts of an effect with several thresholds, the lowest first: these let like shares of the signal pass, where anything passes.
 fn at_like_levels(grids: &[Vec<f64>], thresholds: &[usize]) -> Vec<Start> {
-    let levels = thresholds
-        .iter()
-        .map(|&i| grids[i].len())
-        .min()
-        .unwrap_or(0);
+    let levels = thresholds.iter().map(|&i| grids[i].len()).min();
     let at = |level: usize| -> Vec<Start> {
         let mut grids = grids.to_vec();
         for &i in thresholds {
@@ -284,7 +280,9 @@ fn at_like_levels(grids: &[Vec<f64>], thresholds: &[usize]) -> Vec<Start> {
         }
         starts(&grids, false)
     };
-    (0..levels).flat_map(at).collect()
+    let mut all: Vec<Start> = (0..levels.unwrap_or(0)).flat_map(at).collect();
+    all.retain(|start| thresholds.is_sorted_by(|&i, &j| start.m[i] < start.m[j]));
+    all
 }
 
 /// Starts at every combination of one value of each list.

@@ -48,6 +48,26 @@ fn folds_and_delays_are_looked_for_up_to_their_ends() {
     assert_eq!(delay.axes[0].bounds.high(), 63.0 * 4.0);
 }
 
+/// A range may end on either side alone, or on both: the levels of both then let like shares of the signal pass.
+#[test]
+fn ranges_end_on_either_side_or_on_both() {
+    let study = tanks(60);
+    let terms = listed_terms(&study, &[biased_record(&study, 0.0, 5)]);
+    for id in ["sensor-clipping", "actuator-saturation"] {
+        let own: Vec<_> = terms.iter().filter(|term| term.id == id).collect();
+        let mut ends: Vec<usize> = own.iter().map(|term| term.axes.len()).collect();
+        ends.sort_unstable();
+        assert_eq!(ends, [1, 1, 2], "{id}");
+        let both = own.iter().find(|term| term.axes.len() == 2).unwrap();
+        assert!(!both.starts.is_empty(), "{id}");
+        assert!(
+            both.starts.iter().all(|start| start.m[0] < start.m[1]),
+            "{id}: {:?}",
+            both.starts[0].m
+        );
+    }
+}
+
 /// Levels of tanks that are never empty have positive ends: their priors must be in the coordinate of the fit all the same.
 #[test]
 fn uniform_priors_are_in_the_coordinate_of_the_fit() {
