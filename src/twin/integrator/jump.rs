@@ -96,7 +96,7 @@ struct Bracket {
     ways: [Few; 3],
     /// Rates at both ends.
     ends: [Few; 2],
-    /// What the rates at the end are off the line that they leave the begin on.
+    /// Distances of the rates at the end from the line that they leave the begin on.
     off: Few,
     /// Shares σ between which the jump is, and rates there.
     shares: [f64; 2],
@@ -141,13 +141,13 @@ impl Bracket {
         self.share()
     }
 
-    /// Learns the rates at a share: before the jump they are on the line, behind it as far off as at the end. At a quarter of that the first of two
-    /// like jumps is behind.
+    /// Learns the rates at a share: before the jump they are on the line, behind it as far off as at the end, to either side. At a quarter of that the
+    /// first of two like jumps is behind.
     fn see(&mut self, share: f64, rates: &[f64]) {
         let [first, last] = [0, 1].map(|end: usize| self.ends[end][self.entry]);
         let off = self.off[self.entry];
         let line = first + share * (last - first - off);
-        let side = usize::from((rates[self.entry] - line) / off > 0.25);
+        let side = usize::from((rates[self.entry] - line).abs() > 0.25 * off.abs());
         self.shares[side] = share;
         self.rates[side].copy_from_slice(rates);
     }
@@ -175,10 +175,10 @@ impl Bracket {
         0.5 * (share * (self.ends[0][i] + before) + (1.0 - share) * (behind + end))
     }
 
-    /// The rate at the end of the step, from that a little behind the jump and the one found there: another jump on the way is not in it.
-    fn end(&self, i: usize, onward: f64, end: f64) -> f64 {
-        let behind = self.rates[1][i];
-        let expected = behind + (1.0 - self.share()) * (onward - behind) / NEAR;
+    /// The rate at the end of the step, of that found there: another jump on the way is not in it.
+    fn end(&self, i: usize, end: f64) -> f64 {
+        let slope = self.ends[1][i] - self.ends[0][i] - self.off[i];
+        let expected = self.rates[1][i] + (1.0 - self.share()) * slope;
         match (end - expected).abs() < 0.5 * self.change(i).abs() {
             true => end,
             false => expected,
@@ -202,7 +202,7 @@ pub(super) fn step_with_jumps(
     path: &mut Path<'_, '_>,
     of: Stretch,
     (n, x, seen): (usize, &mut [f64], &mut JumpsSeen),
-    implicit: Option<&mut StepBy<'_>>,
+    mut implicit: Option<&mut StepBy<'_>>,
 ) {
     seen.begin(n);
     let begin = x.to_vec();
@@ -211,11 +211,10 @@ pub(super) fn step_with_jumps(
         begin: &begin,
         h: path.seconds(of),
         of,
-        is_implicit: implicit.is_some(),
     };
     path.held.resize(x.len(), f64::NAN);
     let mut looked = vec![false; x.len()];
-    let mut ways = step.ways(path);
+    let mut ways = step.ways(path, implicit.as_deref_mut());
     for _ in 0..n {
         let passing = step.passing(path, &ways, seen, &mut looked);
         if passing.is_empty() {
@@ -224,7 +223,7 @@ pub(super) fn step_with_jumps(
         for (i, mean) in step.means(path, seen, &passing) {
             path.held[i] = mean;
         }
-        ways = step.ways(path);
+        ways = step.ways(path, implicit.as_deref_mut());
     }
     match implicit {
         Some(implicit) => implicit(path, of, x),
@@ -240,41 +239,58 @@ struct Step<'s> {
     /// Seconds.
     h: f64,
     of: Stretch,
-    is_implicit: bool,
 }
 
-/// Ways of points through a step: x(s) = x₀ + h·(s·first + s²·bends/2).
+/// Ways of points through a step: x(s) = x₀ + h·(s·way + s²·bends/2).
 struct Ways {
     /// Rates at the begin, and their slopes along the step.
     first: Vec<f64>,
     slopes: Vec<f64>,
-    /// The slopes, or nothing where rates are stiff: their change at the begin leads far off.
+    way: Vec<f64>,
     bends: Vec<f64>,
 }
 
 impl Step<'_> {
     /// Where points are at a share of the step.
     fn ahead(&self, ways: &Ways, share: f64) -> Vec<f64> {
-        let ways = self.begin.iter().zip(&ways.first).zip(&ways.bends);
-        let ahead = |((x, rate), bend)| x + share * self.h * (rate + 0.5 * share * bend);
+        let ways = self.begin.iter().zip(&ways.way).zip(&ways.bends);
+        let ahead = |((x, way), bend)| x + share * self.h * (way + 0.5 * share * bend);
         ways.map(ahead).collect()
     }
 
-    fn ways(&self, path: &mut Path<'_, '_>) -> Ways {
+    /// Ways by the rates and their slopes. Those of an implicit rule are straight, and lead to where it does what is stiff: rates at the begin lead far off.
+    fn ways(&self, path: &mut Path<'_, '_>, implicit: Option<&mut StepBy<'_>>) -> Ways {
+        let first = self.rates(path, self.begin);
         let mut ways = Ways {
-            first: self.rates(path, self.begin),
+            way: first.clone(),
             slopes: vec![],
-            bends: vec![0.0; self.begin.len()],
+            bends: vec![0.0; first.len()],
+            first,
         };
-        let near = [NEAR, 2.0 * NEAR].map(|share| self.rates(path, &self.ahead(&ways, share)));
-        let rates = ways.first.iter().zip(&near[0]).zip(&near[1]);
-        ways.slopes = rates
-            .map(|((first, near), next)| slope([*first, *near, *next]))
-            .collect();
-        if !self.is_implicit {
+        ways.slopes = self.slopes(path, &ways);
+        let Some(implicit) = implicit else {
             ways.bends.clone_from(&ways.slopes);
+            return ways;
+        };
+        let is_stiff = |i: &usize| ways.slopes[*i].abs() > ways.first[*i].abs();
+        let stiff: Vec<usize> = (0..self.begin.len()).filter(is_stiff).collect();
+        if !stiff.is_empty() {
+            let mut end = self.begin.to_vec();
+            implicit(path, self.of, &mut end);
+            for i in stiff {
+                ways.way[i] = (end[i] - self.begin[i]) / self.h;
+            }
+            ways.slopes = self.slopes(path, &ways);
         }
         ways
+    }
+
+    /// Slopes of the rates along straight ways.
+    fn slopes(&self, path: &mut Path<'_, '_>, ways: &Ways) -> Vec<f64> {
+        let looks = [NEAR, 2.0 * NEAR, 0.5, 1.0];
+        let looks = looks.map(|share| self.rates(path, &self.ahead(ways, share)));
+        let of = |(i, first): (usize, &f64)| slope(*first, looks.each_ref().map(|all| all[i]));
+        ways.first.iter().enumerate().map(of).collect()
     }
 
     /// Where rates leave their line on the ways of points, searched for a jump: of each point one entry that was not looked at before.
@@ -304,7 +320,11 @@ impl Step<'_> {
             };
             looked[at + entry] = true;
             let [first, _, end] = rates;
-            let ways = [Few::from_elem(0.0, n), first.clone(), of_point(&ways.bends)];
+            let ways = [
+                Few::from_elem(0.0, n),
+                of_point(&ways.way),
+                of_point(&ways.bends),
+            ];
             let mut bracket = Bracket::new((at, entry), ways, [first, end], last);
             bracket.guess(seen.0[entry].share_on(&bracket, self));
             passing.push(bracket);
@@ -321,6 +341,9 @@ impl Step<'_> {
         passing: &[Bracket],
     ) -> Vec<(usize, f64)> {
         let passing: Vec<&Bracket> = passing.iter().filter(|b| b.jumps(b.entry)).collect();
+        if passing.is_empty() {
+            return vec![];
+        }
         let (mut onwards, mut ends) = (self.begin.to_vec(), self.begin.to_vec());
         for bracket in &passing {
             seen.0[bracket.entry].learn(bracket, self);
@@ -332,35 +355,62 @@ impl Step<'_> {
             }
         }
         let [onwards, ends] = [onwards, ends].map(|x| self.rates(path, &x));
-        let (mut means, mut holding) = (vec![], vec![]);
-        for bracket in passing {
+        let (mut means, mut lines) = (vec![], vec![]);
+        for bracket in &passing {
             let (at, entry) = (bracket.at, bracket.entry);
-            let [before, behind] = &bracket.rates;
-            let back = (onwards[at + entry] - behind[entry]) / -bracket.change(entry);
-            let jumping = (0..self.n).filter(|&i| bracket.jumps(i));
-            if back > 0.5 {
-                let straight = Few::from_elem(0.0, self.n);
-                let ways = [bracket.ends[0].clone(), behind.clone(), straight];
-                let off = (0..self.n).map(|i| -bracket.change(i)).collect();
-                let ends = [behind.clone(), before.clone()];
-                let mut line = Bracket::new((at, entry), ways, ends, off);
-                line.guess(seen.0[entry].share);
-                line.guess(seen.0[entry].share_on(&line, self));
-                holding.push((line, jumping.collect()));
-            } else {
-                let end = |i: usize| bracket.end(i, onwards[at + i], ends[at + i]);
-                means.extend(jumping.map(|i| (at + i, bracket.passed(i, end(i)))));
+            let back = (onwards[at + entry] - bracket.rates[1][entry]) / -bracket.change(entry);
+            match back > 0.5 {
+                true => lines.push((*bracket, self.line(bracket, &seen.0[entry]))),
+                false => {
+                    let mean = |i: usize| (at + i, bracket.passed(i, bracket.end(i, ends[at + i])));
+                    means.extend((0..self.n).filter(|&i| bracket.jumps(i)).map(mean));
+                }
             }
         }
-        let (mut lines, jumping): (Vec<Bracket>, Vec<Vec<usize>>) = holding.into_iter().unzip();
+        let (jumps, mut lines): (Vec<&Bracket>, Vec<Bracket>) = lines.into_iter().unzip();
+        self.tell_sides(path, &mut lines);
         self.find(path, &mut lines);
-        for (line, jumping) in lines.iter().zip(jumping) {
+        for (line, jump) in lines.iter().zip(jumps) {
             // What jumps at the begin as well, but is held by another share, has its own bracket.
-            let held = jumping.into_iter().filter(|&i| line.jumps(i));
+            let held = (0..self.n).filter(|&i| jump.jumps(i) && line.jumps(i));
             means.extend(held.map(|i| (line.at + i, line.way(line.share(), i))));
             seen.0[line.entry].share = line.share();
         }
         means
+    }
+
+    /// Points on which one is that a jump holds: between where the rates before it lead and those behind it.
+    fn line(&self, jump: &Bracket, seen: &JumpSeen) -> Bracket {
+        let [before, behind] = &jump.rates;
+        let straight = Few::from_elem(0.0, self.n);
+        let ways = [jump.ends[0].clone(), behind.clone(), straight];
+        let ends = [behind.clone(), before.clone()];
+        let off = (0..self.n).map(|i| -jump.change(i)).collect();
+        let mut line = Bracket::new((jump.at, jump.entry), ways, ends, off);
+        line.guess(seen.share);
+        line.guess(seen.share_on(&line, self));
+        line
+    }
+
+    /// Sides of lines are told by the rates at their ends, where all other states are as behind the step.
+    fn tell_sides(&self, path: &mut Path<'_, '_>, lines: &mut [Bracket]) {
+        if lines.is_empty() {
+            return;
+        }
+        let [first, last] = [0.0, 1.0].map(|share| {
+            let mut x = self.begin.to_vec();
+            for line in &*lines {
+                (0..self.n).for_each(|i| x[line.at + i] = line.state(i, share, self));
+            }
+            self.rates(path, &x)
+        });
+        for line in lines {
+            let at = line.at..line.at + self.n;
+            let ends = [&first, &last].map(|all| Few::from_slice(&all[at.clone()]));
+            line.off = ends[1].iter().zip(&ends[0]).map(|(b, a)| b - a).collect();
+            line.rates.clone_from(&ends);
+            line.ends = ends;
+        }
     }
 
     fn rates(&self, path: &mut Path<'_, '_>, x: &[f64]) -> Vec<f64> {
@@ -394,13 +444,13 @@ impl Step<'_> {
     }
 }
 
-/// Slope of a rate along a step, from its values at the begin and at two places near it: the smaller change, as a jump may be in the other.
-fn slope([first, near, beside]: [f64; 3]) -> f64 {
-    let changes = [near - first, beside - near];
-    match changes[0] * changes[1] > 0.0 {
-        true => changes[usize::from(changes[1].abs() < changes[0].abs())] / NEAR,
-        false => 0.0,
-    }
+/// Slope of a rate along a straight way, from its values at the begin, at two places near it, in the middle and at the end: the smaller of the changes near
+/// the begin, as a jump may be in the other, and no more than twice what the halves change.
+fn slope(first: f64, [near, next, half, end]: [f64; 4]) -> f64 {
+    let (one, other) = (near - first, next - near);
+    let least = if other.abs() < one.abs() { other } else { one };
+    let most = 2.0 * (half - first).abs().max((end - half).abs());
+    (least / NEAR).clamp(-most, most)
 }
 
 /// The entry, of those not looked at, whose rate is farthest off its line, by its own size, in another way than a curve is, a quarter as far in the middle as
@@ -422,8 +472,8 @@ fn bent(
 #[cfg(test)]
 mod tests {
     use super::{JumpsSeen, Path, Stretch, step_with_jumps};
-    use crate::twin::Interval;
     use crate::twin::integrator::{Integrator, Now, Stepping, Workspace};
+    use crate::twin::{Interval, Noise};
 
     /// Points carried over so many rows of 1 s.
     fn carried<const N: usize>(
@@ -523,6 +573,42 @@ mod tests {
         }
     }
 
+    /// Rubbing blocks, friction beside damping and a relay between two levels, from 3000 starts each: no step goes farther than the rates on it allow.
+    #[test]
+    fn no_step_goes_farther_than_its_rates() {
+        type Rates = fn(f64, &[f64], &mut [f64]);
+        let systems: [(&str, Rates); 4] = [
+            ("blocks", |_, x, dx| {
+                let between = 0.4 * sign(x[0] - x[1]);
+                dx[0] = 0.3 - 0.5 * sign(x[0]) - between;
+                dx[1] = between - 0.5 * sign(x[1]);
+            }),
+            ("two levels", |_, x, dx| {
+                dx[0] = 2.0 - 0.6 * sign(x[0]) - 0.6 * sign(x[0] - 5e-5);
+                dx[1] = 2.0 - 0.6 * sign(x[1]) - 0.6 * sign(x[1] - 2.5e-4);
+            }),
+            ("pushed", |_, x, dx| {
+                (dx[0], dx[1]) = (x[1] - 0.6 * sign(x[0]), 2.0);
+            }),
+            ("damped", |_, x, dx| {
+                (dx[0], dx[1]) = (0.3 - 4.0 * x[0] - 0.3 * sign(x[0]), 5.0 * (0.3 - x[1]));
+            }),
+        ];
+        let mut source = Noise::new(7, "starts", 0).source("x");
+        for (name, rates) in systems {
+            for k in 0..3000 {
+                // All the way, and next to where rates jump.
+                let size = [0.5, 0.02, 3e-4][k % 3];
+                let begin = [0; 2].map(|_| size * (2.0 * source.uniform() - 1.0));
+                let end = stepped(0.125, begin, rates);
+                let most = 0.125 * 5.0;
+                for (from, to) in begin.iter().zip(end) {
+                    assert!((to - from).abs() < most, "{name} {begin:?}: {end:?}");
+                }
+            }
+        }
+    }
+
     fn sign(x: f64) -> f64 {
         if x == 0.0 { 0.0 } else { x.signum() }
     }
@@ -568,6 +654,30 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    /// What friction holds stays while another state changes its push by three times the friction within a step, and steps are short enough for a damping
+    /// that is faster than the rows.
+    #[test]
+    fn what_is_held_stays_beside_faster_states() {
+        for change in [1.1, 2.0, -6.0] {
+            let [x, _] = stepped(0.125, [0.0, 0.2], |_, x, dx| {
+                (dx[0], dx[1]) = (x[1] - 0.6 * sign(x[0]), change);
+            });
+            assert!(x.abs() < 1e-6, "{change}: {x}");
+        }
+        for decay in [10.0, 20.0, 30.0] {
+            let end = carried(
+                Integrator::Adaptive,
+                &[[0.3, 0.2], [0.31, 0.2]],
+                3,
+                |_, x, dx| {
+                    (dx[0], dx[1]) = (x[1] - 0.6 * sign(x[0]), decay * (0.3 - x[1]));
+                },
+            );
+            let off = [end[0], end[1] - 0.3, end[2], end[3] - 0.3];
+            assert!(off.iter().all(|off| off.abs() < 1e-3), "{decay}: {off:?}");
         }
     }
 

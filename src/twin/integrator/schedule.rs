@@ -494,17 +494,41 @@ impl SubstepSchedule {
 
     /// Least number of steps of one length: more where states have limits, which act at their ends, where rates change with time, since jumps are looked for
     /// at one time of a step, and where rates are stiff. With a quarter of these a level that turns at its limit ends half a hundredth of its range off.
+    /// Explicit steps are as short as the fastest state asks for.
     fn even(&self, path: &mut Path<'_, '_>, x: &[f64]) -> usize {
-        let [mut first, mut last] = [0.0, 1.0].map(|_| vec![0.0; x.len()]);
         let way = Stretch {
             from: 0.0,
             length: 1.0,
         };
-        path.rates(way, 0.0, x, &mut first);
-        path.rates(way, 1.0, x, &mut last);
-        match path.limits.is_some() || self.is_implicit || first != last {
+        let mut at = |part: f64, x: &[f64]| {
+            let mut rates = vec![0.0; x.len()];
+            path.rates(way, part, x, &mut rates);
+            rates
+        };
+        let first = at(0.0, x);
+        let is_still = first == at(1.0, x);
+        let n = self.sizes.len();
+        let mut fastest = vec![0.0; x.len()];
+        for j in 0..n {
+            let mut beside = |shares: f64| {
+                let mut x = x.to_vec();
+                let states = x.iter_mut().skip(j).step_by(n);
+                states.for_each(|x| *x += shares * 1e-6 * self.sizes[j]);
+                at(0.0, &x)
+            };
+            let (near, next) = (beside(1.0), beside(2.0));
+            for (i, fastest) in fastest.iter_mut().enumerate() {
+                // A jump is in one change of both.
+                let change = (near[i] - first[i]).abs().min((next[i] - near[i]).abs());
+                let rate = change / (1e-6 * self.sizes[i % n]);
+                *fastest += if rate.is_finite() { rate } else { 0.0 };
+            }
+        }
+        let fastest = fastest.into_iter().fold(0.0, f64::max);
+        let has_limits = path.limits.is_some();
+        match has_limits || self.is_implicit || !is_still {
             true => 8 * EVEN,
-            false => EVEN,
+            false => ((2.0 * fastest * path.seconds(way)).ceil() as usize).clamp(EVEN, 8 * EVEN),
         }
     }
 
