@@ -35,7 +35,7 @@ fn log_evidence(study: &Study, effects: &str, record: &Record) -> f64 {
     evidence.map_or(f64::NAN, |evidence| evidence.laplace)
 }
 
-/// The tables of an effect's ways: of several thresholds, one is used at a time.
+/// The tables of an effect's ways: of several thresholds, each is used alone, and all together.
 fn ways(effect: &Effect) -> Vec<String> {
     let entry = effect.entry();
     let mut table = format!(
@@ -66,6 +66,7 @@ fn ways(effect: &Effect) -> Vec<String> {
                 .collect();
             format!("{table}magnitudes = {{ {} }}\n", held.join(", "))
         })
+        .chain([table.clone()])
         .collect()
 }
 

@@ -450,7 +450,8 @@ fn slope(first: f64, [near, next, half, end]: [f64; 4]) -> f64 {
     let (one, other) = (near - first, next - near);
     let least = if other.abs() < one.abs() { other } else { one };
     let most = 2.0 * (half - first).abs().max((end - half).abs());
-    (least / NEAR).clamp(-most, most)
+    // Rates that are no numbers bound nothing, and end the run.
+    (least / NEAR).max(-most).min(most)
 }
 
 /// The entry, of those not looked at, whose rate is farthest off its line, by its own size, in another way than a curve is, a quarter as far in the middle as
