@@ -658,7 +658,7 @@ mod tests {
         }
     }
 
-    /// What friction holds stays while another state changes its push by three times the friction within a step, and steps are short enough for a damping
+    /// A state that friction holds stays while another one changes its push by more than friction within a step, and steps are short enough for a damping
     /// that is faster than the rows.
     #[test]
     fn what_is_held_stays_beside_faster_states() {
