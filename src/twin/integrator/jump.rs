@@ -6,7 +6,7 @@
 //! x(α) = x₀ + h·((1 − α)·f_a + α·f_b)         α = 1 − s where the point goes on from there; where f_b leads back at once, x(α) is at the jump
 //! ```
 //!
-//! What jumps moves by that mean of both rates, all else by its own and its slope. The end of a step is then a continuous function of its begin, to
+//! States whose rates jump move by that mean of both, all others by their own and its slope. The end of a step is then a continuous function of its begin, to
 //! second order: a likelihood is smooth in what moves the points. Sides are told from the rates alone: how far they are off the line that they leave
 //! the begin on. Shares are found by halves, or at once where a jump is met again where it was before. A rate jumps once in a step; jumps of several
 //! rates are met one after the other, so that two blocks come to rest each on its own. Where an implicit rule is given, it takes the step.

@@ -500,6 +500,7 @@ impl SubstepSchedule {
             from: 0.0,
             length: 1.0,
         };
+        let (has_limits, seconds) = (path.limits.is_some(), path.seconds(way));
         let mut at = |part: f64, x: &[f64]| {
             let mut rates = vec![0.0; x.len()];
             path.rates(way, part, x, &mut rates);
@@ -507,6 +508,9 @@ impl SubstepSchedule {
         };
         let first = at(0.0, x);
         let is_still = first == at(1.0, x);
+        if has_limits || self.is_implicit || !is_still {
+            return 8 * EVEN;
+        }
         let n = self.sizes.len();
         let mut fastest = vec![0.0; x.len()];
         for j in 0..n {
@@ -525,11 +529,7 @@ impl SubstepSchedule {
             }
         }
         let fastest = fastest.into_iter().fold(0.0, f64::max);
-        let has_limits = path.limits.is_some();
-        match has_limits || self.is_implicit || !is_still {
-            true => 8 * EVEN,
-            false => ((2.0 * fastest * path.seconds(way)).ceil() as usize).clamp(EVEN, 8 * EVEN),
-        }
+        ((2.0 * fastest * seconds).ceil() as usize).clamp(EVEN, 8 * EVEN)
     }
 
     /// Remembers the largest size of each state of the centre.
