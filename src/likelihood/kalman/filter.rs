@@ -58,6 +58,8 @@ pub struct Kalman<'a> {
     pub(super) floor: Vec<f64>,
     /// The same where the record's values are rounded, and the twin's are not.
     pub(super) unrounded: Vec<f64>,
+    /// Jitter of readings at an end of the sensor's range, as standard deviations.
+    pub(super) jitter: Vec<f64>,
     pub(super) start_covariance: Option<Vec<f64>>,
 }
 
@@ -95,6 +97,7 @@ impl<'a> Kalman<'a> {
             limits,
             unrounded: floor.clone(),
             floor,
+            jitter: FilterSettings::jitters(record),
             start_covariance: (settings.start_covariance.as_ref())
                 .map(|p| p.transpose().as_slice().to_vec()),
         })

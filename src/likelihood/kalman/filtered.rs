@@ -41,22 +41,22 @@ impl Filtered {
         }
     }
 
-    /// Creates that of one output from the innovation and its variance row by row.
+    /// Creates that of one output from the innovation, its variance and the excess of the log-density row by row.
     pub(super) fn of_one_output(
         log_likelihood: f64,
-        rows: impl Iterator<Item = (f64, f64)>,
+        rows: impl Iterator<Item = [f64; 3]>,
         outputs: &Signal,
     ) -> Self {
         let mut filtered = Self::new(outputs.nrows(), 1, None);
         filtered.log_likelihood = log_likelihood;
-        for (k, (innovation, variance)) in rows.enumerate() {
+        for (k, [innovation, variance, excess]) in rows.enumerate() {
             let standardised = innovation / variance.sqrt();
             filtered.innovations[[k, 0]] = innovation;
             filtered.covariances[[k, 0, 0]] = variance;
             filtered.standardised[[k, 0]] = standardised;
             if !outputs[[k, 0]].is_nan() {
                 let square = standardised * standardised;
-                filtered.log_densities[k] = -0.5 * (LOG_TWO_PI + variance.ln() + square);
+                filtered.log_densities[k] = excess - 0.5 * (LOG_TWO_PI + variance.ln() + square);
             }
         }
         filtered

@@ -70,4 +70,5 @@ pub use filtered::{Filtered, States};
 pub(crate) use gaussian::Gaussian;
 pub(crate) use score::Responses;
 pub use score::Score;
+pub(in crate::likelihood) use settings::STOPPED;
 pub use settings::{FilterSettings, Method};

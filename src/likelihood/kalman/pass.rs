@@ -26,7 +26,7 @@ pub(super) struct Innovation<'w, N = f64> {
     /// Variance of each output given those before it.
     pivots: &'w [N],
     /// Nats by which the density exceeds a normal one.
-    excess: N,
+    pub excess: N,
     order: &'w Order<'w>,
     row: usize,
 }
@@ -139,6 +139,7 @@ pub(super) struct Pass<'k, S: Size, N: FilterNumber> {
     scale: S::Vector<N>,
     copy: FilterState<S, N>,
     floor: S::Vector<N>,
+    jitter: S::Vector<N>,
     readings: Vec<Readings>,
     /// The row to come, and the state given those before it.
     row: usize,
@@ -191,6 +192,10 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 }
             });
         }
+        let mut jitter = S::Vector::zeros(p);
+        for (j, jitter) in jitter.numbers_mut()[..p].iter_mut().enumerate() {
+            *jitter = N::of_lanes(|lane| jobs[held_by(lane, jobs.len())].kalman.jitter[j]);
+        }
         let now: Vec<Now<'_>> = (jobs.iter()).map(|job| job.acting.at(0)).collect();
         let theta = |lane| now[held_by(lane, jobs.len())].theta;
         let factors = kalman.twin.level_factors(theta);
@@ -216,6 +221,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             predicted: S::Vector::zeros(p),
             scale: S::Vector::zeros(n),
             floor,
+            jitter,
             readings: match readings.iter().any(Option::is_some) {
                 true => readings
                     .into_iter()
@@ -380,6 +386,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             predicted,
             noise: &self.r.numbers()[..p],
             floor: &self.floor.numbers()[..p],
+            jitter: &self.jitter.numbers()[..p],
             readings: &self.readings,
         };
         if self.order.gaps && row.y.iter().any(|y| y.lane(0).is_nan()) {

@@ -1,7 +1,7 @@
 //! Fitted noise levels: what is declared, or guessed from the records.
 
 use crate::effect::stops;
-use crate::likelihood::kalman::FilterSettings;
+use crate::likelihood::kalman::{FilterSettings, STOPPED};
 use crate::record::{Quantity, Record};
 use crate::twin::{
     Composed, FittedLevels, Interval, LevelSource, LevelValue, Outline, Parameter, Role, Twin,
@@ -27,9 +27,6 @@ numbers! {
         loud: f64 = 0.1,
         /// Range of a fitted level, as powers of e around its guess: rounding at one end, nonsense at the other.
         range: f64 = 12.0,
-        /// Least measurement noise of outputs that stop at an end of their range, as a share of their motion: where the twin stops there, too,
-        /// noise that vanishes would make those samples infinitely likely.
-        stopped: f64 = 1e-3,
         /// Rows of a record that tell sizes of states and levels of noise, at most, evenly spread: a median of so many is right to a hundredth of a
         /// deviation. Half as many change guesses by less than their prior is wide; twice as many take their memory.
         sized_rows: usize = 10_000,
@@ -277,7 +274,8 @@ fn guesses<'a>(
             name: &output.name,
             unit: output.unit.clone(),
             floor: match records.iter().any(has_end) {
-                true => MEASURED.stopped * size,
+                // Where the twin stops there, too, noise that vanishes would make those samples infinitely likely.
+                true => STOPPED * size,
                 false => floor(j).max(f64::MIN_POSITIVE),
             },
             declared: sizes.declared.measurement[j],

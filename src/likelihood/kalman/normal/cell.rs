@@ -1,5 +1,7 @@
 //! A standard normal number of which only a cell is known: what rounding leaves of a signal.
 
+use super::Known;
+
 /// Nodes and weights of the Gauss–Legendre rule with eight points on [−1, 1], by pairs.
 const NODES: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
@@ -12,17 +14,8 @@ const DEPTH: f64 = 36.0;
 /// Most that −log of the density may change over a panel of the rule, which is two standard deviations long at most.
 const CHANGE: f64 = 8.0;
 
-/// Density, mean and variance of z ~ N(0, 1) given that it lies in a cell.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::likelihood::kalman) struct Cell {
-    /// log of the mean of exp(−z²/2) over the cell.
-    pub log_density: f64,
-    pub mean: f64,
-    pub variance: f64,
-}
-
-impl Cell {
-    /// A cell by its centre and its width.
+impl Known {
+    /// That it lies in a cell, by its centre and its width.
     ///
     /// ```text
     /// M_i = ∫ tⁱ·exp(−o·t − t²/2) dt over the cell,  z = ±(o + t)     o: the end nearer to 0, or 0 itself
@@ -31,7 +24,7 @@ impl Cell {
     ///
     /// By quadrature: smooth in both, and exact to 1e-9 also where a cell is narrow, or far out, which differences of the error function
     /// are not.
-    pub fn new(centre: f64, width: f64) -> Self {
+    pub fn in_cell(centre: f64, width: f64) -> Self {
         let nearer = centre.abs() - 0.5 * width;
         let o = nearer.max(0.0);
         let reach = 2.0 * DEPTH / ((o * o + 2.0 * DEPTH).sqrt() + o);
@@ -77,12 +70,12 @@ mod tests {
     #[test]
     fn the_limits_are_exact() {
         for centre in [-3.0, -0.5, 0.0, 1.0, 6.0] {
-            let cell = Cell::new(centre, 1e-4);
+            let cell = Known::in_cell(centre, 1e-4);
             near(cell.log_density, -0.5 * centre * centre, 1e-7);
             near(cell.mean, centre, 1e-8);
             near(cell.variance, 1e-8 / 12.0, 1e-13);
         }
-        let all = Cell::new(0.3, 1e3);
+        let all = Known::in_cell(0.3, 1e3);
         near(
             all.log_density,
             (std::f64::consts::TAU.sqrt() / 1e3).ln(),
@@ -90,7 +83,7 @@ mod tests {
         );
         near(all.mean, 0.0, 1e-9);
         near(all.variance, 1.0, 1e-9);
-        let half = Cell::new(500.0, 1e3);
+        let half = Known::in_cell(500.0, 1e3);
         near(half.mean, (2.0 / std::f64::consts::PI).sqrt(), 1e-9);
         near(half.variance, 1.0 - 2.0 / std::f64::consts::PI, 1e-9);
     }
@@ -101,7 +94,7 @@ mod tests {
     fn a_wide_and_a_far_cell_have_their_moments() {
         let (inner, outer) = (0.241_970_724_519_143_37, 0.004_431_848_411_938_007_5);
         let share = 0.998_650_101_968_369_9 - 0.841_344_746_068_542_9;
-        let cell = Cell::new(2.0, 2.0);
+        let cell = Known::in_cell(2.0, 2.0);
         let mean = (inner - outer) / share;
         near(cell.mean, mean, 1e-9);
         let square = 1.0 + (inner - 3.0 * outer) / share;
@@ -111,12 +104,12 @@ mod tests {
             (share * std::f64::consts::TAU.sqrt() / 2.0).ln(),
             1e-9,
         );
-        let farthest = Cell::new(1e9, 1e-3);
+        let farthest = Known::in_cell(1e9, 1e-3);
         near(farthest.mean, 1e9 - 0.5e-3, 1e-6);
         assert!(farthest.log_density.is_finite() && farthest.variance > 0.0);
-        let far = Cell::new(45.0, 10.0);
+        let far = Known::in_cell(45.0, 10.0);
         near(far.mean - 40.0, 0.024_968_8, 1e-7);
-        let other = Cell::new(-45.0, 10.0);
+        let other = Known::in_cell(-45.0, 10.0);
         near(far.mean, -other.mean, 1e-9);
         near(far.variance, other.variance, 1e-12);
     }

@@ -17,13 +17,13 @@ use crate::twin::MOST_STATES;
 /// So many filters take longer in lanes than one after the other: all lanes cost about two and a half of them.
 const TOO_FEW: usize = 2;
 
-/// Innovation and its variance, row by row; 0 and 1 where the output is missing.
+/// Innovation, its variance, and the nats by which the density exceeds that of a normal one, row by row; 0, 1 and 0 where the output is missing.
 #[derive(Default)]
-pub(in crate::likelihood::kalman) struct LaneRows(pub Vec<[Lanes; 2]>);
+pub(in crate::likelihood::kalman) struct LaneRows(pub Vec<[Lanes; 3]>);
 
 impl Sink<Lanes> for LaneRows {
     fn innovation(&mut self, _: usize, of: &Innovation<'_, Lanes>) {
-        self.0.push([of.innovation[0], of.covariance[0]]);
+        self.0.push([of.innovation[0], of.covariance[0], of.excess]);
     }
 }
 
@@ -153,7 +153,7 @@ impl Kalman<'_> {
             let filtered = |i| {
                 let value = held.log_likelihood(i, &values)?;
                 let lane = held.lane(i)?;
-                let rows = (rows.0.iter()).map(|[e, s]| (e.0[lane], s.0[lane]));
+                let rows = (rows.0.iter()).map(|row| row.map(|of| of.0[lane]));
                 Some(Filtered::of_one_output(value, rows, self.record.outputs()))
             };
             Some((0..held.lanes.len()).map(filtered).collect())

@@ -275,7 +275,7 @@ impl Score {
         let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
         // Reciprocals of variance and deviation.
         let scales: Vec<[f64; 2]> = (centre.0.iter())
-            .map(|[_, s]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
+            .map(|[_, s, _]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
             .collect();
         for ((moved, m), to) in each[1..].iter().zip(moves) {
             let (m, j) = (*m, to.entry);
@@ -284,13 +284,13 @@ impl Score {
                 .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
             let results = samples.zip(shifts).zip(spreads);
             let per_distance = 1.0 / to.distance;
-            for (([[e, _], [e_moved, s_moved]], [per_s, per_sd]), ((sample, shift), spread)) in
-                rows.map(|((a, b), scale)| ([a, b], scale)).zip(results)
-            {
-                let (e, e_moved, s_moved) = (e.0[c], e_moved.0[m], s_moved.0[m]);
+            for (((here, moved), [per_s, per_sd]), ((sample, shift), spread)) in rows.zip(results) {
+                let [e, _, excess] = here.map(|of| of.0[c]);
+                let [e_moved, s_moved, excess_moved] = moved.map(|of| of.0[m]);
                 let ratio = s_moved * per_s;
                 let square = e_moved * e_moved / s_moved - e * e * per_s;
-                *sample = -0.5 * (ln_near_one(ratio) + square) * per_distance;
+                let log = excess_moved - excess - 0.5 * (ln_near_one(ratio) + square);
+                *sample = log * per_distance;
                 *shift = (e_moved - e) * per_distance * per_sd;
                 *spread = (ratio - 1.0) * per_distance;
             }
