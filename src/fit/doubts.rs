@@ -265,12 +265,20 @@ impl<'a> Doubts<'a> {
         noise: &[FittedNoise],
         off: &BTreeMap<String, f64>,
     ) {
+        let is_off = |p: &FittedValue| off.get(&p.name) == Some(&p.value);
+        let effect = |p: &FittedValue| p.name.rsplit_once('.').map(|(effect, _)| effect.to_owned());
         for p in parameters {
             let Some(side) = p.at_bound else { continue };
             let mut doubt = Warning::at_bound("at-bound", &p.name, side);
-            if off.get(&p.name) == Some(&p.value) {
+            if is_off(p) {
+                let mut same = parameters.iter().filter(|other| effect(other) == effect(p));
                 doubt.what = format!("{} lies where the effect is off", p.name);
-                doubt.remedy = "leave the effect out: the record does not ask for it";
+                doubt.remedy = match same
+                    .all(|other| is_off(other) || !off.contains_key(&other.name))
+                {
+                    true => "leave the effect out: the record does not ask for it",
+                    false => "hold it there: the record does not ask for this part of the effect",
+                };
             }
             self.all.push(doubt);
         }

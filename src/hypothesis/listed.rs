@@ -8,7 +8,7 @@ use crate::fit::axis::{Axis, EvidencePrior};
 use crate::hypothesis::limits::TERM;
 use crate::likelihood::kalman::FilterError;
 use crate::record::Signal;
-use crate::twin::{Law, Parameter, Twin};
+use crate::twin::{Interval, Law, Parameter, Twin};
 use std::collections::BTreeMap;
 
 /// Shares of its range at which a size with two ends is tried, besides next to nothing. A part of a signal that is rectified, the only such
@@ -62,7 +62,8 @@ impl Library<'_> {
         Ok(terms)
     }
 
-    /// The hypothesis of an effect that the twin has, all of whose free magnitudes are used together; `None` where none is free.
+    /// The hypothesis of an effect that the twin has, all of whose free magnitudes are used together; `None` where none is free. Those that readings show
+    /// are held there, as in [`terms`](Self::terms).
     pub fn own(&self, effect: &Effect) -> Result<Option<Term>, FilterError> {
         let space = self.twin.parameters();
         let entry = |m: &Magnitude| space.position(&effect.key().magnitude(m.name)).ok();
@@ -77,16 +78,21 @@ impl Library<'_> {
         let mut term = bare(effect, held.collect());
         term.entries = Some(effect.magnitudes().iter().filter_map(entry).collect());
         let (_, values) = self.bent(effect);
-        let term = self.ranged(term, &values, self.twin, true)?;
-        Ok(term.map(|mut term| {
-            if let OutputMark::Present(shown) = effect.kind().marks(&values) {
-                let m = (shown_free(&term, &shown).iter().zip(&term.axes))
-                    .map(|(value, axis)| axis.bounds.clamp(*value))
-                    .collect();
-                term.starts.insert(0, Start::at(m));
+        let Some(mut term) = self.ranged(term, &values, self.twin, true)? else {
+            return Ok(None);
+        };
+        if let OutputMark::Present(shown) = effect.kind().marks(&values) {
+            let shown = shown_free(&term, &shown);
+            let entries = term.entries.iter().flatten();
+            let m = (entries.zip(&shown)).map(|(&j, value)| space[j].bounds.clamp(*value));
+            let m: Vec<f64> = m.collect();
+            for (axis, &value) in term.axes.iter_mut().zip(&m) {
+                axis.bounds = Interval::unchecked(value, value);
+                (axis.centre, axis.held) = (value, true);
             }
-            term
-        }))
+            term.starts = vec![Start::at(m)];
+        }
+        Ok(Some(term))
     }
 
     /// Position of what an effect bends among its kind, and its values; none of a parameter.

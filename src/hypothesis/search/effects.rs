@@ -107,7 +107,8 @@ fn opened(model: &Model, terms: &[Arc<Term>]) -> (Problem, BTreeMap<String, f64>
             let entries = term.entries.iter().flatten();
             for (&j, axis) in entries.zip(&term.axes) {
                 axes[j] = axis.clone();
-                if let Some(end) = ends.get(&space[j].name) {
+                // What readings show is not off anywhere.
+                if let Some(end) = ends.get(&space[j].name).filter(|_| !axis.held) {
                     off.insert(space[j].name.clone(), axis.bounds.clamp(*end));
                 }
             }

@@ -19,6 +19,8 @@ pub(super) struct Innovation<'w, N = f64> {
     pub innovation: &'w [N],
     /// p × p.
     pub covariance: &'w [N],
+    /// Innovation and variances as they would be of a signal with noise alone, without ends of a range, rounding, outliers.
+    pub plain: [&'w [N]; 2],
     /// Not of lanes.
     pub standardised: &'w [N],
     /// The row of the record; NaN where an output is missing, and so has no density.
@@ -356,6 +358,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 predicted: &self.predicted.numbers()[..p],
                 innovation: &self.update.innovation.numbers()[..p],
                 covariance: &self.update.covariance.numbers()[..p * p],
+                plain: (self.update.plain.each_ref()).map(|of| &of.numbers()[..p]),
                 standardised: &self.update.standardised.numbers()[..p],
                 measured: &self.y.numbers()[..p],
                 pivots: &self.update.pivots.numbers()[..p],

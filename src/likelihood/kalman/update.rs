@@ -31,6 +31,8 @@ pub(super) struct Update<S: Size, N: Number> {
     pub innovation: S::Vector<N>,
     /// S (p × p).
     pub covariance: S::Matrix<N>,
+    /// y − ȳ and the variances of each output as they would be of a signal with noise alone.
+    pub plain: [S::Vector<N>; 2],
     /// C⁻¹·(y − ȳ), with S = C·Cᵀ; not of lanes.
     pub standardised: S::Vector<N>,
     /// Squares of C's diagonal: variance of each output given those before it.
@@ -77,6 +79,7 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
             beside: S::Matrix::zeros(p * p),
             innovation: S::Vector::zeros(p),
             covariance: S::Matrix::zeros(p * p),
+            plain: [S::Vector::zeros(p), S::Vector::zeros(p)],
             standardised: S::Vector::zeros(p),
             pivots: S::Vector::zeros(p),
             excess: N::ZERO,
@@ -154,6 +157,10 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
         }
         if changed {
             self.spread(outputs);
+        }
+        for j in 0..p {
+            self.plain[0].numbers_mut()[j] = self.innovation.numbers()[j];
+            self.plain[1].numbers_mut()[j] = self.covariance.numbers()[j * p + j];
         }
         self.excess = N::ZERO;
         if !(row.readings.is_empty() && ranges.is_empty()) {

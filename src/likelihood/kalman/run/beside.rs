@@ -17,13 +17,25 @@ use crate::twin::MOST_STATES;
 /// So many filters take longer in lanes than one after the other: all lanes cost about two and a half of them.
 const TOO_FEW: usize = 2;
 
-/// Innovation, its variance, and the nats by which the density exceeds that of a normal one, row by row; 0, 1 and 0 where the output is missing.
+/// Rows of several filters; innovations and variances are 0 and 1 where the output is missing.
 #[derive(Default)]
-pub(in crate::likelihood::kalman) struct LaneRows(pub Vec<[Lanes; 3]>);
+pub(in crate::likelihood::kalman) struct LaneRows(pub Vec<LaneRow>);
+
+/// One row of several filters.
+#[derive(Clone, Copy)]
+pub(in crate::likelihood::kalman) struct LaneRow {
+    /// Innovation, its variance, and the nats by which the density exceeds that of a normal one.
+    pub seen: [Lanes; 3],
+    /// Innovation and variance as they would be of a signal with noise alone.
+    pub plain: [Lanes; 2],
+}
 
 impl Sink<Lanes> for LaneRows {
     fn innovation(&mut self, _: usize, of: &Innovation<'_, Lanes>) {
-        self.0.push([of.innovation[0], of.covariance[0], of.excess]);
+        self.0.push(LaneRow {
+            seen: [of.innovation[0], of.covariance[0], of.excess],
+            plain: of.plain.map(|plain| plain[0]),
+        });
     }
 }
 
@@ -153,7 +165,7 @@ impl Kalman<'_> {
             let filtered = |i| {
                 let value = held.log_likelihood(i, &values)?;
                 let lane = held.lane(i)?;
-                let rows = (rows.0.iter()).map(|row| row.map(|of| of.0[lane]));
+                let rows = (rows.0.iter()).map(|row| row.seen.map(|of| of.0[lane]));
                 Some(Filtered::of_one_output(value, rows, self.record.outputs()))
             };
             Some((0..held.lanes.len()).map(filtered).collect())

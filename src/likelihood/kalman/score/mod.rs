@@ -19,6 +19,9 @@ use std::ops::Range;
 /// fisher = Σ ∂e_kᵀ S_k⁻¹ ∂e_k + ½·tr(S_k⁻¹ ∂S_k S_k⁻¹ ∂S_k)             e, S: innovations and their covariances
 /// ```
 ///
+/// What a reading tells less of its signal than noise alone would let it (at an end of a range, rounded, maybe an outlier) is in S_k, and not in its
+/// change: ∂S_k is that of the signal with noise.
+///
 /// Where the twin is right at θ, s has mean zero, and fisher has the Fisher information as its mean. (The outer product of
 /// the rows' gradients has the same mean there, but is much too large elsewhere, and steps by it too short.) Takes
 /// 2·d + 1 passes over the record.
@@ -57,7 +60,7 @@ struct Slope {
     middle: f64,
 }
 
-/// Log-density, innovation and covariance of each row of a block.
+/// Log-density of each row of a block, innovation and covariance as of a signal with noise alone, and the variances with which it was seen.
 struct ScoreRows {
     first: usize,
     width: usize,
@@ -66,7 +69,7 @@ struct ScoreRows {
 
 impl ScoreRows {
     fn of(rows: Range<usize>, p: usize) -> Self {
-        let width = 1 + p + p * p;
+        let width = 1 + 2 * p + p * p;
         Self {
             first: rows.start,
             width,
@@ -80,8 +83,14 @@ impl Sink for ScoreRows {
         let (p, at) = (of.innovation.len(), (i - self.first) * self.width);
         let row = &mut self.values.as_mut_slice()[at..at + self.width];
         row[0] = of.log_density();
-        row[1..=p].copy_from_slice(of.innovation);
-        row[p + 1..].copy_from_slice(of.covariance);
+        let [innovation, variances] = of.plain;
+        row[1..=p].copy_from_slice(innovation);
+        let (covariance, seen) = row[p + 1..].split_at_mut(p * p);
+        covariance.copy_from_slice(of.covariance);
+        for j in 0..p {
+            covariance[j * p + j] = variances[j];
+            seen[j] = of.covariance[j * p + j];
+        }
     }
 }
 
@@ -275,7 +284,8 @@ impl Score {
         let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
         // Reciprocals of variance and deviation.
         let scales: Vec<[f64; 2]> = (centre.0.iter())
-            .map(|[_, s, _]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
+            .map(|row| row.seen[1].0[c])
+            .map(|s| [1.0 / s, 1.0 / s.sqrt()])
             .collect();
         for ((moved, m), to) in each[1..].iter().zip(moves) {
             let (m, j) = (*m, to.entry);
@@ -284,15 +294,16 @@ impl Score {
                 .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
             let results = samples.zip(shifts).zip(spreads);
             let per_distance = 1.0 / to.distance;
-            for (((here, moved), [per_s, per_sd]), ((sample, shift), spread)) in rows.zip(results) {
-                let [e, _, excess] = here.map(|of| of.0[c]);
-                let [e_moved, s_moved, excess_moved] = moved.map(|of| of.0[m]);
-                let ratio = s_moved * per_s;
+            for (((here, there), [per_s, per_sd]), ((sample, shift), spread)) in rows.zip(results) {
+                let [e, _, excess] = here.seen.map(|of| of.0[c]);
+                let [e_moved, s_moved, excess_moved] = there.seen.map(|of| of.0[m]);
                 let square = e_moved * e_moved / s_moved - e * e * per_s;
-                let log = excess_moved - excess - 0.5 * (ln_near_one(ratio) + square);
-                *sample = log * per_distance;
+                let log = 0.5 * (ln_near_one(s_moved * per_s) + square);
+                *sample = (excess_moved - excess - log) * per_distance;
+                let [e, s] = here.plain.map(|of| of.0[c]);
+                let [e_moved, s_moved] = there.plain.map(|of| of.0[m]);
                 *shift = (e_moved - e) * per_distance * per_sd;
-                *spread = (ratio - 1.0) * per_distance;
+                *spread = (s_moved - s) * per_distance * per_s;
             }
         }
         self.add_one_output(&samples, [&shifts, &spreads]);
@@ -306,11 +317,11 @@ impl Score {
         jacobian: &DMatrix<f64>,
         p: usize,
     ) -> Result<(), usize> {
-        let (d, width) = (jacobian.ncols(), 1 + p + p * p);
+        let (d, width) = (jacobian.ncols(), 1 + 2 * p + p * p);
         let n = centre.len() / width;
         let samples = DMatrix::from_fn(n, d, |k, j| jacobian[(k * width, j)]);
         if p == 1 {
-            let scale = |k: usize| centre[k * width + 2];
+            let scale = |k: usize| centre[k * width + 3];
             let shift =
                 DMatrix::from_fn(n, d, |k, j| jacobian[(k * width + 1, j)] / scale(k).sqrt());
             let change = DMatrix::from_fn(n, d, |k, j| jacobian[(k * width + 2, j)] / scale(k));
@@ -319,8 +330,10 @@ impl Score {
         }
         self.gradient += samples.row_sum_tr();
         for k in 0..n {
-            let (at, end) = (k * width + 1, (k + 1) * width);
-            let covariance = &centre.as_slice()[at + p..end];
+            let at = k * width + 1;
+            let row = &centre.as_slice()[at + p..(k + 1) * width];
+            let mut covariance = DMatrix::from_column_slice(p, p, &row[..p * p]);
+            covariance.set_diagonal(&DVector::from_column_slice(&row[p * p..]));
             let change = &jacobian.rows(at, p + p * p);
             add_information(covariance, change, &mut self.fisher).ok_or(k)?;
         }
@@ -437,12 +450,12 @@ fn ln_near_one(ratio: f64) -> f64 {
 
 /// One row's part of the expected information; `change` holds the derivatives of innovation and covariance.
 fn add_information(
-    covariance: &[f64],
+    covariance: DMatrix<f64>,
     change: &DMatrixView<'_, f64>,
     fisher: &mut DMatrix<f64>,
 ) -> Option<()> {
-    let p = change.nrows() - covariance.len();
-    let inverse = (DMatrix::from_column_slice(p, p, covariance).cholesky())?.inverse();
+    let p = covariance.nrows();
+    let inverse = covariance.cholesky()?.inverse();
     let parts: Vec<_> = (change.column_iter())
         .map(|of| {
             let shift = of.rows(0, p).into_owned();

@@ -5,6 +5,7 @@ use crate::likelihood::kalman::normal::Known;
 use crate::likelihood::kalman::number::FilterNumber;
 use crate::likelihood::kalman::size::{Buffer, Size};
 use crate::twin::{Composed, Interval, Outliers};
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
 /// Rounding and outliers of a sensor.
@@ -50,7 +51,7 @@ const LEAST_TOLD: f64 = 1e-6;
 
 /// A reading as one of a signal with noise that has its density, and moves the state as it does.
 ///
-/// Exact in density and mean for one output, and in variance where no outlier is possible; for several, each is taken for itself.
+/// Exact in density and mean for one output, and in variance where no outlier is possible.
 #[derive(Clone, Copy)]
 struct Seen {
     innovation: f64,
@@ -114,7 +115,8 @@ fn normal(e: f64, s: f64) -> f64 {
 }
 
 impl<S: Size, N: FilterNumber> Update<S, N> {
-    /// Takes outputs that are there for rounded ones, for those of a range, and for outliers.
+    /// Takes outputs that are there for rounded ones, for those of a range, and for outliers: each for itself, given the plain ones of the row and
+    /// those before it.
     #[cold]
     pub(super) fn apply_readings(
         &mut self,
@@ -125,44 +127,97 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
         let p = self.size.outputs();
         for lane in 0..row.at.1.whole().len() {
             let readings = row.readings.get(lane);
-            for j in (0..p).filter(|&j| !is_missing(j)) {
-                let step = readings.and_then(|readings| readings.step(j));
+            let special = |j: usize| {
                 let ends = (ranges.iter()).find(|r| (r.lane, r.output) == (lane, j));
-                let ends = ends.map(|ranged| ranged.ends);
-                let outlier = readings.and_then(|readings| readings.outlier(j));
+                let special = Special {
+                    step: readings.and_then(|readings| readings.step(j)),
+                    ends: ends.map_or(Interval::EVERYTHING, |ranged| ranged.ends),
+                    outlier: readings.and_then(|readings| readings.outlier(j)),
+                };
+                special.is_any().then_some(special)
+            };
+            let there = || (0..p).filter(|&j| !is_missing(j));
+            let mut known: Vec<usize> = there().filter(|&j| special(j).is_none()).collect();
+            for (j, special) in there().filter_map(|j| Some((j, special(j)?))) {
                 let e = self.innovation.numbers()[j].lane(lane);
-                let s = self.covariance.numbers()[j * p + j].lane(lane);
                 // What is no number stays none, and ends the pass.
-                if (step.is_none() && ends.is_none() && outlier.is_none()) || !e.is_finite() {
+                if !e.is_finite() {
                     continue;
                 }
-                let off = |end: f64| end - row.predicted[j].lane(lane);
-                let ends = ends.unwrap_or(Interval::EVERYTHING);
-                let ends = (off(ends.low()), off(ends.high()));
-                let jitter = row.jitter[j].lane(lane);
-                let seen = match step {
-                    Some(step) => Seen::of_known(s, rounded(e, ends, step, s.sqrt())),
-                    None if ends.0.is_finite() || ends.1.is_finite() => {
-                        let [e, low, high, jitter] =
-                            [e, ends.0, ends.1, jitter].map(|v| v / s.sqrt());
-                        Seen::of_known(s, Known::in_range(e, (low, high), jitter))
-                    }
-                    None => Seen::plain(e, s),
-                };
-                let seen = outlier.map_or(seen, |outlier| seen.or(outlier, e, s));
-                self.see(lane, j, seen);
+                let (shift, s) = self.given(lane, j, &known);
+                let [predicted, noise, jitter] =
+                    [row.predicted[j], self.noise.numbers()[j], row.jitter[j]]
+                        .map(|of| of.lane(lane));
+                let ends =
+                    [special.ends.low(), special.ends.high()].map(|end| end - predicted - shift);
+                let seen = special.seen(e - shift, s, (ends[0], ends[1]), [jitter, noise.sqrt()]);
+                let at = j * p + j;
+                let wider = seen.variance - s;
+                *self.beside.numbers_mut()[at].lane_mut(lane) += wider;
+                *self.covariance.numbers_mut()[at].lane_mut(lane) += wider;
+                *self.innovation.numbers_mut()[j].lane_mut(lane) = seen.innovation + shift;
+                *self.excess.lane_mut(lane) +=
+                    seen.log_density - normal(seen.innovation, seen.variance);
+                known.push(j);
             }
         }
     }
 
-    /// Puts a reading in the place of output j, and adds what its density then lacks.
-    fn see(&mut self, lane: usize, j: usize, seen: Seen) {
-        let at = j * self.size.outputs() + j;
-        let covariance = self.covariance.numbers_mut()[at].lane_mut(lane);
-        *self.beside.numbers_mut()[at].lane_mut(lane) += seen.variance - *covariance;
-        *covariance = seen.variance;
-        *self.innovation.numbers_mut()[j].lane_mut(lane) = seen.innovation;
-        *self.excess.lane_mut(lane) += seen.log_density - normal(seen.innovation, seen.variance);
+    /// Mean and variance of an innovation given others; as without them where these do not vary.
+    fn given(&self, lane: usize, j: usize, others: &[usize]) -> (f64, f64) {
+        let p = self.size.outputs();
+        let n = others.len();
+        if n == 0 {
+            return (0.0, self.covariance.numbers()[j * p + j].lane(lane));
+        }
+        let covariance = |i: usize, j: usize| self.covariance.numbers()[i * p + j].lane(lane);
+        let among = DMatrix::from_fn(n, n, |a, b| covariance(others[a], others[b]));
+        let with = DVector::from_fn(n, |a, _| covariance(others[a], j));
+        let weights = among.cholesky().map(|root| root.solve(&with));
+        let weights = weights.unwrap_or_else(|| DVector::zeros(n));
+        let variance = covariance(j, j) - with.dot(&weights);
+        if variance.is_nan() || variance <= 0.0 {
+            return (0.0, covariance(j, j));
+        }
+        let innovation = |i: &usize| self.innovation.numbers()[*i].lane(lane);
+        let mean = others
+            .iter()
+            .zip(&weights)
+            .map(|(i, weight)| weight * innovation(i));
+        (mean.sum(), variance)
+    }
+}
+
+/// What makes a reading more than a signal with noise.
+struct Special {
+    step: Option<f64>,
+    ends: Interval,
+    outlier: Option<Outliers>,
+}
+
+impl Special {
+    fn has_end(&self) -> bool {
+        self.ends.low().is_finite() || self.ends.high().is_finite()
+    }
+
+    fn is_any(&self) -> bool {
+        self.step.is_some() || self.outlier.is_some() || self.has_end()
+    }
+
+    /// A reading `e` beyond the mean of N(0, s), with the ends of its range there, its jitter at these and its noise.
+    fn seen(&self, e: f64, s: f64, ends: (f64, f64), [jitter, noise]: [f64; 2]) -> Seen {
+        let deviation = s.sqrt();
+        let usual = match self.step {
+            Some(step) => Seen::of_known(s, rounded(e, ends, step, deviation)),
+            None if self.has_end() => {
+                let [e, low, high, jitter, noise] =
+                    [e, ends.0, ends.1, jitter, noise].map(|v| v / deviation);
+                Seen::of_known(s, Known::in_range(e, (low, high), jitter, noise))
+            }
+            None => Seen::plain(e, s),
+        };
+        self.outlier
+            .map_or(usual, |outlier| usual.or(outlier, e, s))
     }
 }
 
@@ -171,7 +226,7 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
 fn rounded(e: f64, (low, high): (f64, f64), step: f64, deviation: f64) -> Known {
     let [from, to] = [e - 0.5 * step, e + 0.5 * step];
     let from = if from <= low { f64::NEG_INFINITY } else { from };
-    let to = if to >= high { f64::INFINITY } else { to };
+    let to = if to > high { f64::INFINITY } else { to };
     let known = Known::between(from / deviation, to / deviation);
     Known {
         log_density: known.log_density + 0.5 * TAU.ln() - (step / deviation).ln(),

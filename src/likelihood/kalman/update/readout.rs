@@ -17,9 +17,10 @@ const NODES: [(f64, f64); 5] = [
 ];
 /// Values of an output that are read: the nodes, behind the least and the greatest value that counts.
 pub(super) const PROBES: usize = 2 + NODES.len();
-/// Shares of a range at which it is looked whether the sensor leaves its signal alone there; no multiples of a common step.
-const WITHIN: [f64; 3] = [0.23, 0.5, 0.81];
-/// A reading so many jitters from an end is not at it.
+/// Shares of a range at which it is looked whether the sensor leaves its signal alone there, and of the way beyond an end whether it shows the
+/// end: sensors that repeat themselves, such as those that round or wrap around, show other values at one of them.
+const WITHIN: [f64; 3] = [0.2287, 0.5131, 0.8093];
+/// A reading so many jitters from an end is not at it, and a range is wider than two of these.
 const BESIDE: f64 = 5.0;
 /// Difference of readings that is rounding, as a share of their jitter.
 const SAME: f64 = 1e-3;
@@ -67,7 +68,7 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
         let mut ranges = vec![];
         for lane in (0..row.at.1.whole().len()).filter(|lane| bent.lane(*lane) != 0.0) {
             for j in 0..p {
-                match self.ends(row, lane, j) {
+                match self.range(row, lane, j) {
                     Some(ends) => ranges.push(Ranged {
                         lane,
                         output: j,
@@ -81,7 +82,7 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
     }
 
     /// The range of output j, the others as they were read; `None` where the sensor does anything else than stop at its ends.
-    fn ends(&self, row: &MeasuredRow<'_, '_, N>, lane: usize, j: usize) -> Option<Interval> {
+    fn range(&self, row: &MeasuredRow<'_, '_, N>, lane: usize, j: usize) -> Option<Interval> {
         let p = self.size.outputs();
         let (twin, now) = row.at;
         let mut all: Vec<f64> = row.y.iter().map(|y| y.lane(lane)).collect();
@@ -95,31 +96,11 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
         let [y, predicted, jitter] = [row.y, row.predicted, row.jitter].map(|of| of[j].lane(lane));
         let reach = self.covariance.numbers()[j * p + j].lane(lane).sqrt() * NODES[0].0;
         let beside = jitter * BESIDE;
-        let (least, greatest) = (
+        let outermost = [
             (predicted - reach).min(y - beside),
             (predicted + reach).max(y + beside),
-        );
-        let near = |a: f64, b: f64| (a - b).abs() <= SAME * jitter;
-        let (low, high) = (read(least), read(greatest));
-        let is_wide = high - low > jitter;
-        let mut stays = |value: f64| near(read(value), value);
-        let is_free = WITHIN.iter().all(|share| stays(low + share * (high - low)));
-        if !(is_wide && is_free && stays(low) && stays(high)) {
-            return None;
-        }
-        // The end goes on to the outermost value.
-        let mut is_end = |end: f64, outermost: f64| near(read(0.5 * (end + outermost)), end);
-        let low = match near(low, least) {
-            true => f64::NEG_INFINITY,
-            false if is_end(low, least) => low,
-            false => return None,
-        };
-        let high = match near(high, greatest) {
-            true => f64::INFINITY,
-            false if is_end(high, greatest) => high,
-            false => return None,
-        };
-        Some(Interval::unchecked(low, high))
+        ];
+        ends(&mut read, outermost, jitter)
     }
 
     fn linearise(
@@ -158,6 +139,86 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
         let slope = slope / self.covariance.numbers()[j * p + j].lane(lane).sqrt();
         for output in outputs.iter_mut().skip(j).step_by(p) {
             *output.lane_mut(lane) *= slope;
+        }
+    }
+}
+
+/// Ends of a clamp between its least and greatest value that counts, infinite where they are not met; `None` for anything else.
+fn ends(
+    read: &mut impl FnMut(f64) -> f64,
+    [least, greatest]: [f64; 2],
+    jitter: f64,
+) -> Option<Interval> {
+    let beside = jitter * BESIDE;
+    let [low, high] = [least, greatest].map(&mut *read);
+    let near = |a: f64, b: f64| (a - b).abs() <= SAME * jitter;
+    let mut shows = |value: f64, shown: f64| near(read(value), shown);
+    // An end goes on to the outermost value, and just inside of it is the signal.
+    let mut is_end = |end: f64, outermost: f64, inwards: f64| {
+        let way = outermost - end;
+        shows(end, end)
+            && shows(end + inwards, end + inwards)
+            && WITHIN.iter().all(|share| shows(end + share * way, end))
+    };
+    let (open_low, open_high) = (f64::NEG_INFINITY, f64::INFINITY);
+    if near(low, high) {
+        // All that counts is beyond one end.
+        return match high < least {
+            true => is_end(high, greatest, -beside).then(|| Interval::unchecked(open_low, high)),
+            false => is_end(low, least, beside).then(|| Interval::unchecked(low, open_high)),
+        };
+    }
+    let (has_low, has_high) = (!near(low, least), !near(high, greatest));
+    let stands = high - low > 2.0 * beside
+        && (!has_low || is_end(low, least, beside))
+        && (!has_high || is_end(high, greatest, -beside));
+    let mut inside = WITHIN.iter().map(|share| low + share * (high - low));
+    let is_clamp = stands && inside.all(|value| shows(value, value));
+    let low = if has_low { low } else { open_low };
+    let high = if has_high { high } else { open_high };
+    is_clamp.then(|| Interval::unchecked(low, high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_clamps_have_ends() {
+        let of = |readout: &dyn Fn(f64) -> f64, outermost| {
+            ends(&mut |value| readout(value), outermost, 1e-3).map(|ends| (ends.low(), ends.high()))
+        };
+        let clamp = |value: f64| value.clamp(0.0, 1.0);
+        let (below, above) = (f64::NEG_INFINITY, f64::INFINITY);
+        assert_eq!(of(&clamp, [-0.5, 0.7]), Some((0.0, above)));
+        assert_eq!(of(&clamp, [0.2, 40.0]), Some((below, 1.0)));
+        assert_eq!(of(&clamp, [-0.5, 1.7]), Some((0.0, 1.0)));
+        assert_eq!(of(&clamp, [1.2, 1.7]), Some((below, 1.0)));
+        assert_eq!(of(&clamp, [-1.2, -0.3]), Some((0.0, above)));
+        assert_eq!(of(&clamp, [0.2, 0.7]), Some((below, above)));
+        let others: [(&str, &dyn Fn(f64) -> f64); 9] = [
+            ("rounding", &|v| (v / 0.1).round() * 0.1),
+            ("fine rounding", &|v| (v / 0.01).round() * 0.01),
+            ("rectifier", &f64::abs),
+            ("cut-off", &|v| if v > 0.05 { v } else { 0.0 }),
+            ("dead zone", &|v| v - v.clamp(-0.2, 0.2)),
+            ("gain", &|v| 1.1 * v),
+            ("soft", &f64::tanh),
+            ("wrap", &|v| v.rem_euclid(1.0)),
+            ("fault", &|v| if v > 1.0 { 99.0 } else { v }),
+        ];
+        for (name, readout) in others {
+            for width in [0.3, 1.3, 2.2, 2.7, 8.0] {
+                for centre in [0.0, 0.2, 0.5, 1.1] {
+                    let outermost = [centre - width, centre + width];
+                    let found = of(readout, outermost);
+                    let is_free = outermost.iter().all(|v| readout(*v) == *v);
+                    assert!(
+                        found.is_none() || is_free,
+                        "{name} {outermost:?}: {found:?}"
+                    );
+                }
+            }
         }
     }
 }

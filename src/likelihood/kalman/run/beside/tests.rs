@@ -61,7 +61,8 @@ fn agree_at(kalman: &Kalman<'_>, thetas: &[Vec<f64>]) {
         let expected = scalar.log_likelihood;
         let error = (found - expected).abs() / expected.abs().max(1.0);
         assert!(error < 1e-10, "lane {lane}: {found} {expected}");
-        for (k, [e, s, _]) in rows.0.iter().enumerate() {
+        for (k, row) in rows.0.iter().enumerate() {
+            let [e, s, _] = row.seen;
             let (scale, variance) = (s.0[lane].sqrt(), scalar.covariances[[k, 0, 0]]);
             // A point within rounding of a limit, where a root bends without end, is moved by the root of rounding.
             assert!((e.0[lane] - scalar.innovations[[k, 0]]).abs() < 1e-9 * scale);
