@@ -4,7 +4,7 @@ use super::evidence::Evidence;
 use super::posterior::{Posterior, PosteriorRegion};
 use super::profile::Profile;
 use crate::record::Signal;
-use crate::twin::{Noise, Role, Side, Stepping, StepsTaken};
+use crate::twin::{Noise, Parameter, Role, Side, Stepping, StepsTaken};
 use serde::Serialize;
 
 /// Settings of a fit.
@@ -101,9 +101,9 @@ pub struct FittedValue {
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// Most probable value.
+    /// Most probable value; infinite for an end of a range that the readings do not show.
     pub value: f64,
-    /// Standard error, first order; with the interval, not a number where the search has not arrived.
+    /// Standard error, first order, 0 where the readings show the value; with the interval, not a number where the search has not arrived.
     pub std_error: f64,
     /// Lower end of the interval, which holds the value.
     pub low: f64,
@@ -117,6 +117,25 @@ pub struct FittedValue {
 }
 
 impl FittedValue {
+    /// A magnitude that the readings show, and that is not fitted: at the bound of its parameter, it is off without end.
+    pub(super) fn shown(p: &Parameter, value: f64) -> Self {
+        let value = match value {
+            low if low <= p.bounds.low() => f64::NEG_INFINITY,
+            high if high >= p.bounds.high() => f64::INFINITY,
+            within => within,
+        };
+        Self {
+            name: p.name.clone(),
+            unit: p.unit.clone(),
+            value,
+            std_error: 0.0,
+            low: value,
+            high: value,
+            by_profile: false,
+            at_bound: None,
+        }
+    }
+
     /// Takes error and interval back: about a point that is no top they say nothing.
     pub(super) fn withhold_error(&mut self) {
         (self.std_error, self.low, self.high) = (f64::NAN, f64::NAN, f64::NAN);

@@ -245,14 +245,19 @@ fn values(
             noise.extend(std::iter::once(own.clone()).chain(in_proportion));
             continue;
         }
+        let value = fitted.theta[j];
+        if p.role == Role::Magnitude && problem.axes[j].held {
+            parameters.push(FittedValue::shown(p, value));
+            continue;
+        }
         parameters.push(FittedValue {
             name: p.name.clone(),
             unit: p.unit.clone(),
-            value: fitted.theta[j],
+            value,
             std_error: errors[j],
             // At a bound, draws may lie on one side of the value alone.
-            low: spread.low[j].min(fitted.theta[j]),
-            high: spread.high[j].max(fitted.theta[j]),
+            low: spread.low[j].min(value),
+            high: spread.high[j].max(value),
             by_profile: false,
             at_bound: certificate.at_bound[j],
         });

@@ -100,12 +100,21 @@ impl ParameterRow {
         }
     }
 
+    /// Returns whether readings show it, so that there is nothing to fit.
+    fn is_shown(&self) -> bool {
+        self.role == Role::Magnitude && self.std_error == 0.0
+    }
+
     /// Special standing of the value; empty where it has none.
     fn note(&self) -> &'static str {
         let [low, high] = self.interval;
         let is_outside = high < self.prior.low() || low > self.prior.high();
         let is_anywhere = low <= self.bounds.low() && high >= self.bounds.high();
         match (self.at_bound, self.role) {
+            (None, Role::Magnitude) if self.is_shown() => match self.value.is_finite() {
+                true => "shown by the readings",
+                false => "off",
+            },
             (Some(Side::Low), _) => "at lower bound",
             (Some(_), _) => "at upper bound",
             (None, Role::Parameter) if self.prior_share >= 1.0 || is_anywhere => "not identified",
@@ -142,8 +151,11 @@ pub(super) fn values(caption: &str, level: f64, rows: &[ParameterRow]) -> Block 
         vec![
             row.label(),
             digits.write(row.value),
-            digits::error(row.std_error),
-            match row.interval.iter().all(|end| end.is_nan()) {
+            match row.is_shown() {
+                true => "–".to_owned(),
+                false => digits::error(row.std_error),
+            },
+            match row.is_shown() || row.interval.iter().all(|end| end.is_nan()) {
                 true => "–".to_owned(),
                 false => format!("[{low}, {high}]"),
             },

@@ -169,7 +169,8 @@ fn ends(
         };
     }
     let (has_low, has_high) = (!near(low, least), !near(high, greatest));
-    let stands = high - low > 2.0 * beside
+    let is_wide = !(has_low && has_high) || high - low > 2.0 * beside;
+    let stands = is_wide
         && (!has_low || is_end(low, least, beside))
         && (!has_high || is_end(high, greatest, -beside));
     let mut inside = WITHIN.iter().map(|share| low + share * (high - low));
@@ -193,6 +194,7 @@ mod tests {
         assert_eq!(of(&clamp, [-0.5, 0.7]), Some((0.0, above)));
         assert_eq!(of(&clamp, [0.2, 40.0]), Some((below, 1.0)));
         assert_eq!(of(&clamp, [-0.5, 1.7]), Some((0.0, 1.0)));
+        assert_eq!(of(&clamp, [0.995, 3.0]), Some((below, 1.0)));
         assert_eq!(of(&clamp, [1.2, 1.7]), Some((below, 1.0)));
         assert_eq!(of(&clamp, [-1.2, -0.3]), Some((0.0, above)));
         assert_eq!(of(&clamp, [0.2, 0.7]), Some((below, above)));
