@@ -57,7 +57,7 @@ impl Library<'_> {
         if let OutputMark::Present(shown) = mark {
             terms
                 .iter_mut()
-                .for_each(|term| marked(term, &shown, &values));
+                .for_each(|term| marked(term, &shown, &values, self.scales.has_equations()));
         }
         Ok(terms)
     }
@@ -265,14 +265,12 @@ fn shown_free(term: &Term, shown: &[f64]) -> Vec<f64> {
 }
 
 /// Holds magnitudes where the outputs show them: they are not to be fitted.
-fn marked(term: &mut Term, shown: &[f64], values: &[f64]) {
+fn marked(term: &mut Term, shown: &[f64], values: &[f64], is_filtered: bool) {
     term.starts = vec![Start::at(shown_free(term, shown))];
-    // Values on few levels repeat at an end without a limit there.
     let rounds = matches!(&term.part, Part::Effect { effect, .. } if matches!(effect.law(), Law::Rounding(_)));
-    term.mark = match !rounds && on_levels(values) {
-        true => 0.0,
-        false => TERM.mark_present,
-    };
+    // Filters count readings at an end themselves. Values on few levels repeat at an end without a limit there.
+    let counts = rounds || !(is_filtered || on_levels(values));
+    term.mark = if counts { TERM.mark_present } else { 0.0 };
     term.axes.iter_mut().for_each(|axis| axis.held = true);
 }
 

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 ///
 /// | key | holds |
 /// |---|---|
-/// | `parameters` | name, unit, value, standard error, interval, prior, bounds; `prior_share`: variance over the prior's; `at_bound`: `low`, `high` or null |
+/// | `parameters` | name, unit, value, standard error, interval, prior, bounds; `prior_share`: variance over the prior's; `at_bound`: `low`, `high` or null. Of a magnitude that the readings show the error is 0; of an end that is off, the value is null |
 /// | `noise` | fitted levels: states in units per √s, outputs in their own, `y.share` the share of \|y\| that is added to that of `y`; `declared` is null where nothing was declared; `at_bound` as of parameters |
 /// | `starts` | states at the first sample of each record, given all of it |
 /// | `level` | level of the intervals |

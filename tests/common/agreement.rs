@@ -50,7 +50,8 @@ fn ways(effect: &Effect) -> Vec<String> {
     let thresholds: Vec<_> = (effect.magnitudes().iter())
         .filter(|m| m.is_threshold())
         .collect();
-    if thresholds.len() < 2 {
+    // Where readings stop, the ends that are used are shown.
+    if thresholds.len() < 2 || entry.id == "sensor-saturation" {
         return vec![table];
     }
     (thresholds.iter())
@@ -70,7 +71,7 @@ fn ways(effect: &Effect) -> Vec<String> {
         .collect()
 }
 
-/// Effects that a diagnosis reports, fitted with each in the study; those that outputs bear a mark of are left out, as a fit reads no marks.
+/// Effects that a diagnosis reports, fitted with each in the study.
 pub(crate) fn compared(study: &Study, record: &Record, without: &[&str]) -> Vec<Compared> {
     let settings = DiagnoseSettings {
         without: without.iter().map(|id| (*id).into()).collect(),
@@ -87,7 +88,6 @@ pub(crate) fn compared(study: &Study, record: &Record, without: &[&str]) -> Vec<
     let best = (found.cause.effects.iter()).map(|e| e.log_evidence);
     let best = best.fold(0.0, f64::max);
     (found.cause.effects.iter())
-        .filter(|e| e.id != "sensor-quantization" && e.id != "sensor-saturation")
         .filter(|e| accepted.len() < 2 || !accepted.contains(&e.key()))
         .map(|e| {
             let same = study.effects().into_iter();

@@ -19,21 +19,28 @@ fn reference(name: &str) -> Study {
 fn a_fit_and_a_diagnosis_weigh_an_effect_alike() {
     let plan = RecordPlan::levels(4.0, 80, 0.5, 3.0, 20);
     let tanks = Study::new("tanks", truetwin::twins::CascadedTanks, plan).unwrap();
-    let record = simulated(
-        &tanks,
-        "sensor-bias",
-        "sensor",
-        &[4.0],
-        &[0.6, 0.5, 0.55, 1.0],
-    );
     let all: Vec<String> = tanks.effects().iter().map(|e| e.id().to_owned()).collect();
-    let kept = ["sensor-bias", "sensor-lag", "linear-loss", "parameter-step"];
-    let without: Vec<&str> = (all.iter().map(String::as_str))
-        .filter(|id| !kept.contains(id))
-        .collect();
-    let all = compared(&tanks, &record, &without);
-    assert!(all.iter().any(|c| c.diagnosed > 10.0));
-    let wrong = differing("tanks", &all);
+    let mut wrong = vec![];
+    for (id, magnitudes, kept) in [
+        (
+            "sensor-bias",
+            &[4.0][..],
+            &["sensor-lag", "linear-loss", "parameter-step"][..],
+        ),
+        ("sensor-saturation", &[-9.0, 3.0], &["sensor-bias"]),
+    ] {
+        let record = simulated(&tanks, id, "sensor", magnitudes, &[0.6, 0.5, 0.55, 1.0]);
+        let without: Vec<&str> = (all.iter().map(String::as_str))
+            .filter(|other| *other != id && !kept.contains(other))
+            .collect();
+        let all = compared(&tanks, &record, &without);
+        assert!(
+            all.iter()
+                .any(|c| c.key.starts_with(id) && c.diagnosed > 10.0),
+            "{id}"
+        );
+        wrong.extend(differing(id, &all));
+    }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 

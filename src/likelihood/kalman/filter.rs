@@ -104,14 +104,15 @@ impl<'a> Kalman<'a> {
     }
 
     /// Gives no row more than one density per cell of what the record's values are rounded to, unless the twin rounds them itself: a quiet
-    /// twin could otherwise be as likely as it likes where a value repeats.
+    /// twin could otherwise be as likely as it likes where a value repeats, and readings at an end of a range, too.
     ///
     /// ```text
     /// r² ≥ q²/2π:   N(ȳ; ȳ, r²) ≤ 1/q
     /// ```
     pub(in crate::likelihood) fn of_cells(mut self) -> Self {
-        for (least, cell) in self.unrounded.iter_mut().zip(self.record.cells()) {
-            *least = least.max(*cell);
+        for (j, cell) in self.record.cells().iter().enumerate() {
+            self.unrounded[j] = self.unrounded[j].max(*cell);
+            self.jitter[j] = self.jitter[j].max(cell.sqrt());
         }
         self
     }
