@@ -406,7 +406,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("work");
         open(&path, 2).unwrap();
-        let name = ".truetwin-unfinished-4711-a1B2c3";
+        let name = ".truetwin-unfinished-4194305-a1B2c3";
         let left = [place.path().join(name), path.join(name)];
         let in_part = path.join("runs").join(name);
         for file in left.iter().chain([&in_part]) {

@@ -122,7 +122,7 @@ mod tests {
         }
     }
 
-    /// What is far is not felt, and what cannot be has a bound.
+    /// Far ends are not felt, and readings that cannot be have a bound.
     #[test]
     fn a_range_that_is_far_is_none() {
         let known = Known::in_range(0.3, (-40.0, 1e9), 1e-3, 0.5);

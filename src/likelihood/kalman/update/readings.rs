@@ -69,7 +69,7 @@ impl Seen {
         }
     }
 
-    /// Of N(ȳ, `s`), of which a reading tells this in standard deviations from ȳ:
+    /// Seen of N(ȳ, `s`), of which a reading tells this in standard deviations from ȳ:
     ///
     /// ```text
     /// z | reading ~ (μ, v) for z ~ N(0, 1),   S ← S/(1 − v),   y − ȳ ← √S·μ/(1 − v)
@@ -188,7 +188,7 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
     }
 }
 
-/// What makes a reading more than a signal with noise.
+/// Rounding, range and outliers that make a reading more than a signal with noise.
 struct Special {
     step: Option<f64>,
     ends: Interval,
@@ -221,7 +221,7 @@ impl Special {
     }
 }
 
-/// What a value that is rounded to `step` tells, all relative to ȳ: its density is the mean of N(ȳ, S) over its cell, which at an end of
+/// A value that is rounded to `step`, all relative to ȳ: its density is the mean of N(ȳ, S) over its cell, which at an end of
 /// the range goes on for ever.
 fn rounded(e: f64, (low, high): (f64, f64), step: f64, deviation: f64) -> Known {
     let [from, to] = [e - 0.5 * step, e + 0.5 * step];
