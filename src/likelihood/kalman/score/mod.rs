@@ -19,7 +19,7 @@ use std::ops::Range;
 /// fisher = Σ ∂e_kᵀ S_k⁻¹ ∂e_k + ½·tr(S_k⁻¹ ∂S_k S_k⁻¹ ∂S_k)             e, S: innovations and their covariances
 /// ```
 ///
-/// What a reading tells less of its signal than noise alone would let it (at an end of a range, rounded, maybe an outlier) is in S_k, and not in its
+/// Readings at an end of a range, rounded ones and possible outliers tell less of their signal than noise alone would let them. That is in S_k, and not in its
 /// change: ∂S_k is that of the signal with noise.
 ///
 /// Where the twin is right at θ, s has mean zero, and fisher has the Fisher information as its mean. (The outer product of

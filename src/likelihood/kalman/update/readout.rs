@@ -4,7 +4,7 @@ use super::readings::Ranged;
 use super::{MeasuredRow, Update};
 use crate::likelihood::kalman::number::FilterNumber;
 use crate::likelihood::kalman::size::{Buffer, Size};
-use crate::math::Condition;
+use crate::math::{Condition, Number};
 use crate::twin::Interval;
 
 /// Nodes and weights of the Gauss–Hermite rule with five points, for a standard normal.
@@ -26,8 +26,7 @@ const BESIDE: f64 = 5.0;
 const SAME: f64 = 1e-3;
 
 impl<S: Size, N: FilterNumber> Update<S, N> {
-    /// Reads the least and the greatest value that counts of each output: those of the outermost nodes, or just beyond the reading; the
-    /// nodes, too, where these are bent. Returns the lanes in which they are.
+    /// Reads the least and the greatest value that counts of each output, and the nodes where these are bent. Returns the lanes in which they are.
     #[inline(always)]
     pub(super) fn read_probes(&mut self, row: &MeasuredRow<'_, '_, N>) -> N::Condition {
         let p = self.size.outputs();
@@ -35,10 +34,10 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
         let (outermost, nodes) = self.read.split_at_mut(2 * p);
         let (least, greatest) = outermost.split_at_mut(p);
         for j in 0..p {
-            let reach = covariance[j * p + j].sqrt() * NODES[0].0;
-            let beside = row.jitter[j] * BESIDE;
-            least[j] = (row.predicted[j] - reach).min(row.y[j] - beside);
-            greatest[j] = (row.predicted[j] + reach).max(row.y[j] + beside);
+            [least[j], greatest[j]] = counting(
+                (row.predicted[j], covariance[j * p + j]),
+                (row.y[j], row.jitter[j]),
+            );
         }
         // Where these are not bent, nothing between them is.
         let bent = N::readout(row.at, outermost);
@@ -94,12 +93,8 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
             all[j]
         };
         let [y, predicted, jitter] = [row.y, row.predicted, row.jitter].map(|of| of[j].lane(lane));
-        let reach = self.covariance.numbers()[j * p + j].lane(lane).sqrt() * NODES[0].0;
-        let beside = jitter * BESIDE;
-        let outermost = [
-            (predicted - reach).min(y - beside),
-            (predicted + reach).max(y + beside),
-        ];
+        let variance = self.covariance.numbers()[j * p + j].lane(lane);
+        let outermost = counting((predicted, variance), (y, jitter));
         ends(&mut read, outermost, jitter)
     }
 
@@ -141,6 +136,16 @@ impl<S: Size, N: FilterNumber> Update<S, N> {
             *output.lane_mut(lane) *= slope;
         }
     }
+}
+
+/// The least and the greatest value of an output that counts: those of the outermost nodes, or just beyond the reading.
+#[inline(always)]
+fn counting<N: Number>((predicted, variance): (N, N), (y, jitter): (N, N)) -> [N; 2] {
+    let (reach, beside) = (variance.sqrt() * NODES[0].0, jitter * BESIDE);
+    [
+        (predicted - reach).min(y - beside),
+        (predicted + reach).max(y + beside),
+    ]
 }
 
 /// Ends of a clamp between its least and greatest value that counts, infinite where they are not met; `None` for anything else.

@@ -64,7 +64,7 @@ fn record(theta: &[f64], samples: usize, run: u64) -> Record {
     Record::new(drive, outputs.unwrap()).unwrap()
 }
 
-/// Of a level that does not move, readings inside the range have the density of the noise, those at an end the probability of all
+/// Readings of a level that does not move have the density of the noise inside the range, and at an end the probability of all
 /// that is beyond it, over that of a jitter.
 #[test]
 fn readings_at_an_end_have_its_probability() {
