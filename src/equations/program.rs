@@ -1,8 +1,8 @@
 //! Computes the expressions of a text: its equations, point after point and in blocks.
 
 use super::jumps::Jumps;
-use super::tape::{LanesFeed, OperationTape, PointsFeed, TapeFeed};
-use crate::math::{Kernel, LANES, Lanes, widest};
+use super::tape::{LanesFeed, OperationTape, PointsFeed};
+use crate::math::{LANES, Lanes};
 use crate::twin::{Blocks, Integrator, Interval, Layout, Now, Outline, StateSpace, Stepping};
 use smallvec::SmallVec;
 use std::cell::Cell;
@@ -44,21 +44,6 @@ const MANY: usize = 8;
 /// Points from which on wide groups are no slower than narrow ones.
 const MANY_POINTS: usize = 40;
 
-/// A tape over a feed, for the widest vectors.
-struct Wide<'t, F, const G: usize> {
-    tape: &'t OperationTape,
-    feed: F,
-}
-
-impl<F: TapeFeed<G>, const G: usize> Kernel for Wide<'_, F, G> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(mut self) {
-        self.tape.run::<G>(&mut self.feed);
-    }
-}
-
 impl OperationTape {
     /// Computes the outputs of one point.
     pub fn point(&self, now: &Now<'_>, x: &[f64], outputs: &mut [f64]) {
@@ -92,10 +77,7 @@ impl OperationTape {
             0 => {}
             1 => self.run::<1>(&mut points),
             _ if count < MANY_POINTS => self.run::<FEW>(&mut points),
-            _ => widest(Wide::<_, MANY> {
-                tape: self,
-                feed: points,
-            }),
+            _ => self.run::<MANY>(&mut points),
         }
     }
 }
@@ -225,7 +207,7 @@ impl Blocks for Program {
         let steps: [f64; LANES] = std::array::from_fn(|lane| now.get(lane).unwrap_or(&now[0]).dt);
         let x = Cell::from_mut(x).as_slice_of_cells();
         let is_discrete = self.integrator == Integrator::Discrete;
-        let feed = LanesFeed {
+        let mut feed = LanesFeed {
             now,
             points,
             states,
@@ -242,16 +224,13 @@ impl Blocks for Program {
                 })));
             },
         };
-        widest(Wide {
-            tape: &self.tapes.drift,
-            feed,
-        });
+        self.tapes.drift.run(&mut feed);
     }
 
     fn drift_joined(&self, now: &[Now<'_>], at: Layout, each: usize, x: &[f64], dx: &mut [f64]) {
         let dx = Cell::from_mut(dx).as_slice_of_cells();
         let last = now.len() - 1;
-        let feed = LanesFeed {
+        let mut feed = LanesFeed {
             now,
             points: each / at.stride,
             states: at.stride,
@@ -265,10 +244,7 @@ impl Blocks for Program {
                 }
             },
         };
-        widest(Wide {
-            tape: &self.tapes.drift,
-            feed,
-        });
+        self.tapes.drift.run(&mut feed);
     }
 
     fn is_wide(&self) -> bool {
@@ -283,16 +259,13 @@ impl Blocks for Program {
             }
             return;
         }
-        let feed = LanesFeed {
+        let mut feed = LanesFeed {
             now,
             points: x.len() / states,
             states,
             load: |index: usize| x[index],
             take: |point: usize, _: usize, values: Lanes| y[point] = values,
         };
-        widest(Wide {
-            tape: &self.tapes.observe,
-            feed,
-        });
+        self.tapes.observe.run(&mut feed);
     }
 }

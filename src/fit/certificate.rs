@@ -55,7 +55,7 @@ impl Certificate {
         })
     }
 
-    /// `true` where the gradient is gone and more than one search ended there.
+    /// `true` where the gradient is gone and more than one search ended there, or the only one.
     pub fn has_converged(&self) -> bool {
         // Three that began apart need no majority: some starts are there to find other tops.
         let enough = self.agreeing > 2 || 2 * self.agreeing > self.searches && self.agreeing > 1;

@@ -220,7 +220,7 @@ impl From<Evidence> for FitEvidence {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Convergence {
-    /// `true` where the gradient is gone and more than one search ended here.
+    /// `true` where the gradient is gone and more than one search ended here, or the only one.
     pub converged: bool,
     /// Distance to the top, in standard deviations.
     pub distance: f64,

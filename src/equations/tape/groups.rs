@@ -1,6 +1,7 @@
 //! Operations over groups of numbers.
 
 use crate::equations::expression::{Binary, OnOne, OnTwo, Unary};
+use crate::math::{Kernel, LANES, widest};
 use std::cell::Cell;
 
 /// First number of a value, and the way from one group to the next.
@@ -103,7 +104,7 @@ impl<const G: usize> OnTwo for Groups<'_, G> {
 impl PlacedOperation {
     /// Does it for so many groups.
     #[inline(always)]
-    pub fn run<const G: usize>(&self, numbers: &[Cell<f64>], count: usize) {
+    fn run<const G: usize>(&self, numbers: &[Cell<f64>], count: usize) {
         let groups = Groups::<G> {
             numbers,
             count,
@@ -115,5 +116,42 @@ impl PlacedOperation {
             Work::Two(operation) => operation.over(groups),
             Work::If => groups.choose(),
         }
+    }
+}
+
+/// Operations one after the other, each over so many groups.
+struct All<'n, const G: usize> {
+    operations: &'n [PlacedOperation],
+    numbers: &'n [Cell<f64>],
+    count: usize,
+}
+
+impl<const G: usize> Kernel for All<'_, G> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for operation in self.operations {
+            operation.run::<G>(self.numbers, self.count);
+        }
+    }
+}
+
+/// Does operations one after the other, each over so many groups; groups that fill the widest vectors, in these. It is compiled once for each
+/// size of groups: whatever gives and takes the numbers pays a call.
+#[inline(never)]
+pub(super) fn run_all<const G: usize>(
+    operations: &[PlacedOperation],
+    numbers: &[Cell<f64>],
+    count: usize,
+) {
+    let all = All::<G> {
+        operations,
+        numbers,
+        count,
+    };
+    match G < LANES {
+        true => all.run(),
+        false => widest(all),
     }
 }

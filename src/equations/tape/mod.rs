@@ -7,10 +7,11 @@ mod feed;
 mod groups;
 mod scratch;
 
-pub(super) use feed::{LanesFeed, PointsFeed, TapeFeed};
+pub(super) use feed::{LanesFeed, PointsFeed};
 
 use super::graph::{Graph, Id, Node, Varies};
-use groups::{Place, PlacedOperation, Work, load, store};
+use feed::TapeFeed;
+use groups::{Place, PlacedOperation, Work, load, run_all, store};
 use scratch::{Numbers, keep_numbers, new_id, take_numbers};
 use std::cell::Cell;
 
@@ -199,7 +200,6 @@ impl OperationTape {
     }
 
     /// Computes the outputs of all points of a feed.
-    #[inline(always)]
     pub fn run<const G: usize>(&self, feed: &mut impl TapeFeed<G>) {
         let kind = (self.id, G);
         let mut numbers = take_numbers(kind).unwrap_or_else(|| self.begin::<G>());
@@ -237,7 +237,6 @@ impl OperationTape {
     }
 
     /// Computes what is the same for all points.
-    #[inline(always)]
     fn prepare<const G: usize>(
         &self,
         feed: &impl TapeFeed<G>,
@@ -254,9 +253,7 @@ impl OperationTape {
             store(numbers, at(slot), value);
         }
         if is_changed {
-            for operation in by_parameters {
-                operation.run::<G>(numbers, 1);
-            }
+            run_all::<G>(by_parameters, numbers, 1);
         }
         for &(index, slot) in &self.inputs {
             store(numbers, at(slot), feed.input(index));
@@ -264,13 +261,12 @@ impl OperationTape {
         if let Some(slot) = self.time {
             store(numbers, at(slot), feed.time());
         }
-        for operation in by_step {
-            operation.run::<G>(numbers, 1);
+        if !by_step.is_empty() {
+            run_all::<G>(by_step, numbers, 1);
         }
     }
 
     /// Computes what differs from point to point, a block of points after the other.
-    #[inline(always)]
     fn each_block<const G: usize>(
         &self,
         feed: &mut impl TapeFeed<G>,
@@ -286,9 +282,7 @@ impl OperationTape {
                     store(numbers, start + k * G, feed.state(state, begin + k));
                 }
             }
-            for operation in by_state {
-                operation.run::<G>(numbers, count);
-            }
+            run_all::<G>(by_state, numbers, count);
             for (output, &slot) in self.outputs.iter().enumerate() {
                 let (start, step) = place::<G>(slot, first);
                 for k in 0..count {

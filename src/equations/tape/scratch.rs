@@ -27,8 +27,6 @@ pub(super) fn new_id() -> u64 {
 pub(super) type Kind = (u64, usize);
 
 /// Takes the numbers of a tape as its last call on this thread left them, if it kept them.
-///
-/// They are taken and given back, and not lent to a closure: what runs on them is then compiled for the vectors of its caller.
 #[inline]
 pub(super) fn take_numbers(kind: Kind) -> Option<Box<Numbers>> {
     KEPT_NUMBERS.with_borrow_mut(|kept| {

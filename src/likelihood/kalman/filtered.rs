@@ -4,6 +4,7 @@ use super::gaussian::{Belief, Gaussian};
 use super::likelihood::LOG_TWO_PI;
 use super::order::Order;
 use super::pass::{Innovation, Pass, Sink};
+use super::run::AnyPass;
 use super::size::Any;
 use super::{FilterError, Kalman};
 use crate::record::Signal;
@@ -291,7 +292,7 @@ impl Kalman<'_> {
                 Some(k) => Pass::behind(size, jobs, (k, states[k].as_belief()), to),
                 None => Pass::new(size, jobs),
             };
-            pass.run_to((first + block).min(samples), to)?;
+            AnyPass::run_to(&mut pass, (first + block).min(samples), to)?;
         }
         Ok(())
     }

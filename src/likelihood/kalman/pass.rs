@@ -1,7 +1,8 @@
 //! One pass of a filter over its record, row by row; or of several filters side by side.
 
+mod sink;
+
 use super::gaussian::{Belief, Columns, Root, regular};
-use super::likelihood::LOG_TWO_PI;
 use super::moments::{Moment, Moments};
 use super::normal::clip::clip;
 use super::number::FilterNumber;
@@ -11,66 +12,7 @@ use super::update::{MeasuredRow, Readings, Update};
 use super::{FilterError, Kalman};
 use crate::math::{Condition, Number};
 use crate::twin::{Acting, LanePlaces, LevelFactors, Now, SimulationError};
-
-/// Innovation of one row.
-pub(super) struct Innovation<'w, N = f64> {
-    /// Outputs given the rows before.
-    pub predicted: &'w [N],
-    pub innovation: &'w [N],
-    /// p × p.
-    pub covariance: &'w [N],
-    /// Innovation and variances as they would be of a signal with noise alone, without ends of a range, rounding, outliers.
-    pub plain: [&'w [N]; 2],
-    /// Not of lanes.
-    pub standardised: &'w [N],
-    /// The row of the record; NaN where an output is missing, and so has no density.
-    measured: &'w [N],
-    /// Variance of each output given those before it.
-    pivots: &'w [N],
-    /// Nats by which the density exceeds a normal one.
-    pub excess: N,
-    order: &'w Order<'w>,
-    row: usize,
-}
-
-impl<N> Innovation<'_, N> {
-    /// Sample at which the record has output j, if it has it.
-    pub fn sample_of(&self, j: usize) -> Option<usize> {
-        self.order.sample_of(self.row, j)
-    }
-}
-
-impl Innovation<'_> {
-    /// log p(y_k | y_0 … y_{k−1}), in nats.
-    pub fn log_density(&self) -> f64 {
-        let values = (self.standardised.iter().zip(self.pivots)).zip(self.measured);
-        let sum: f64 = values
-            .filter(|(_, y)| !y.is_nan())
-            .map(|((e, pivot), _)| LOG_TWO_PI + pivot.ln() + e * e)
-            .sum();
-        self.excess - 0.5 * sum
-    }
-}
-
-/// Receiver of the results of a pass. Results that it does not need are not computed.
-pub(super) trait Sink<N = f64> {
-    /// Returns `true` if [`carried`](Self::carried) is wanted.
-    #[inline(always)]
-    fn wants_carried(&self) -> bool {
-        false
-    }
-    /// Takes that of row i in the [`Order`] of the filter.
-    #[inline(always)]
-    fn innovation(&mut self, _i: usize, _of: &Innovation<'_, N>) {}
-    /// State given rows up to k.
-    #[inline(always)]
-    fn filtered(&mut self, _k: usize, _state: Belief<'_, N>) {}
-    /// State of row k + 1 given rows up to k, and cov(x_k, x_{k+1}).
-    #[inline(always)]
-    fn carried(&mut self, _k: usize, _next: Belief<'_, N>, _cross: &[N]) {}
-}
-
-impl<N> Sink<N> for () {}
+pub(super) use sink::{Innovation, Sink};
 
 /// The state given the rows so far; apart from the buffers, of which calls to the twin see some, so that it can stay in registers.
 struct FilterState<S: Size, N: Number> {
@@ -151,6 +93,9 @@ pub(super) struct Pass<'k, S: Size, N: FilterNumber> {
 }
 
 impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
+    /// `true` if rows of full rank are compiled apart. Lanes would change bits of each other.
+    const REGULAR_APART: bool = S::KNOWN && N::LANES == 1;
+
     /// Before the first row.
     pub fn new(size: S, jobs: &'k [FilterJob<'k>]) -> Self {
         let mut pass = Self::prepared(size, jobs);
@@ -159,11 +104,11 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
     }
 
     /// Behind row k, the state given rows up to which is known.
-    pub fn behind<K: Sink<N> + ?Sized>(
+    pub fn behind(
         size: S,
         jobs: &'k [FilterJob<'k>],
         (k, known): (usize, Belief<'_, N>),
-        sink: &mut K,
+        sink: &mut dyn Sink<N>,
     ) -> Self {
         let mut pass = Self::prepared(size, jobs);
         let n = size.states();
@@ -237,11 +182,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
 
     /// Goes on through the rows before `end`.
     #[inline(always)]
-    pub fn run_to<K: Sink<N> + ?Sized>(
-        &mut self,
-        end: usize,
-        sink: &mut K,
-    ) -> Result<(), FilterError> {
+    pub fn run_to(&mut self, end: usize, sink: &mut dyn Sink<N>) -> Result<(), FilterError> {
         let n = self.size.states();
         let mut root = Root::new(n);
         // A copy: what a call has seen leaves the registers.
@@ -318,12 +259,12 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
 
     /// Puts row i into the state.
     #[inline(always)]
-    fn measure<K: Sink<N> + ?Sized>(
+    fn measure(
         &mut self,
         i: usize,
         state: &mut FilterState<S, N>,
         root: &mut Root<S::Matrix<N>>,
-        sink: &mut K,
+        sink: &mut dyn Sink<N>,
     ) -> Result<(), FilterError> {
         let (n, p) = (self.size.states(), self.size.outputs());
         let k = self.order.state_of(i);
@@ -336,8 +277,15 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         }
         let good = match self.regular(state) {
             Some(columns) => self.update_state(state, Columns::all(n, columns.numbers())),
+            None if Self::REGULAR_APART => {
+                self.copy.set(state.belief(n));
+                let good = self.update_singular(root);
+                state.set(self.copy.belief(n));
+                good
+            }
             None => {
-                self.factor(state, root);
+                let Belief { mean, cov } = state.belief(n);
+                root.factor(mean, cov);
                 self.update_state(state, root.columns())
             }
         };
@@ -400,12 +348,12 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
 
     /// Carries the state from row k to the next, unless that is another reading of it. Filters side by side have the same replicates.
     #[inline(always)]
-    fn go_on<K: Sink<N> + ?Sized>(
+    fn go_on(
         &mut self,
         k: usize,
         state: &mut FilterState<S, N>,
         root: &mut Root<S::Matrix<N>>,
-        sink: &mut K,
+        sink: &mut dyn Sink<N>,
     ) {
         if !self.jobs[0].acting.stands(k) {
             return self.carry(k, state, root, sink);
@@ -418,32 +366,39 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
 
     /// Carries the state from row k to the next.
     #[inline(always)]
-    fn carry<K: Sink<N> + ?Sized>(
+    fn carry(
         &mut self,
         k: usize,
         state: &mut FilterState<S, N>,
         root: &mut Root<S::Matrix<N>>,
-        sink: &mut K,
+        sink: &mut dyn Sink<N>,
     ) {
+        let n = self.size.states();
         match self.regular(state) {
             Some(columns) => {
-                let all = Columns::all(self.size.states(), columns.numbers());
+                let all = Columns::all(n, columns.numbers());
                 self.predict(k, state, all, sink);
             }
+            None if Self::REGULAR_APART => {
+                self.copy.set(state.belief(n));
+                self.predict_singular(k, root, sink);
+                state.set(self.copy.belief(n));
+            }
             None => {
-                self.factor(state, root);
+                let Belief { mean, cov } = state.belief(n);
+                root.factor(mean, cov);
                 self.predict(k, state, root.columns(), sink);
             }
         }
     }
 
     #[inline(always)]
-    fn predict<K: Sink<N> + ?Sized>(
+    fn predict(
         &mut self,
         k: usize,
         state: &mut FilterState<S, N>,
         root: Columns<'_, N>,
-        sink: &mut K,
+        sink: &mut dyn Sink<N>,
     ) {
         let n = self.size.states();
         let (mean, cov) = state.slices(n);
@@ -464,30 +419,47 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         }
     }
 
-    /// Cholesky's columns of the covariance where all its pivots count, as they mostly do. What follows is compiled for
-    /// this rank apart, and finds the columns in registers. Lanes would change bits of each other.
+    /// As [`update_state`](Self::update_state), of the copy and any rank: a call, so that the loop holds the rows of full rank alone.
+    #[inline(never)]
+    fn update_singular(&mut self, root: &mut Root<S::Matrix<N>>) -> N::Condition {
+        let mut state = self.take_copy(root);
+        let good = self.update_state(&mut state, root.columns());
+        self.copy = state;
+        good
+    }
+
+    /// As [`predict`](Self::predict), of the copy and any rank.
+    #[inline(never)]
+    fn predict_singular(
+        &mut self,
+        k: usize,
+        root: &mut Root<S::Matrix<N>>,
+        sink: &mut dyn Sink<N>,
+    ) {
+        let mut state = self.take_copy(root);
+        self.predict(k, &mut state, root.columns(), sink);
+        self.copy = state;
+    }
+
+    /// The copy, whose covariance is factored.
+    #[inline(always)]
+    fn take_copy(&mut self, root: &mut Root<S::Matrix<N>>) -> FilterState<S, N> {
+        let n = self.size.states();
+        let Belief { mean, cov } = self.copy.belief(n);
+        root.factor(mean, cov);
+        std::mem::replace(&mut self.copy, FilterState::zero(n))
+    }
+
+    /// Cholesky's columns of the covariance where all its pivots count, as they mostly do. What follows finds the columns in registers.
     #[inline(always)]
     fn regular(&self, state: &FilterState<S, N>) -> Option<S::Matrix<N>> {
         let n = self.size.states();
-        if !S::KNOWN || N::LANES > 1 {
+        if !Self::REGULAR_APART {
             return None;
         }
         let mut columns = S::Matrix::zeros(n * n);
         let Belief { mean, cov } = state.belief(n);
         regular(mean, cov, columns.numbers_mut()).then_some(columns)
-    }
-
-    /// The root of any covariance.
-    #[inline(always)]
-    fn factor(&mut self, state: &FilterState<S, N>, root: &mut Root<S::Matrix<N>>) {
-        let n = self.size.states();
-        let mut at = state.belief(n);
-        if N::LANES == 1 {
-            // Of a copy: what a call has seen leaves the registers.
-            self.copy.set(at);
-            at = self.copy.belief(n);
-        }
-        root.factor(at.mean, at.cov);
     }
 
     #[inline(always)]

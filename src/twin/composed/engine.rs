@@ -107,18 +107,7 @@ impl<T: StateSpace> Engine for T {
 
     fn advance_points(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
         if work.is_adaptive() {
-            let n = points.shifts.len();
-            let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
-                self.drift_points(now, Layout::dense(n), x, dx);
-            };
-            let carry = |x: &mut [f64], work: &mut Workspace| {
-                self.update_points(now, Layout::dense(n), x);
-                work.jump_at(|tell| tell(now, self.jumps(now)));
-                work.limit_to(|| self.limits_at(now));
-                work.carry(n, now, x, drift);
-            };
-            let constrain = |x: &mut [f64]| self.constrain_points(now, Layout::dense(n), x);
-            return advance_together(n, points, work, carry, constrain);
+            return advance_adaptively(self, now, points, work);
         }
         // Loops of known length, for the sizes of most twins.
         let advance = |x: &mut [f64]| step(self, &[], now, x, work);
@@ -254,6 +243,27 @@ fn run_alone<T: StateSpace>(
         ),
     };
     simulate(&Alone(twin, &outline.events), &mut setup, noise)
+}
+
+/// Carries points over a step in substeps to a tolerance, the same for all.
+#[inline(never)]
+fn advance_adaptively<T: StateSpace>(
+    twin: &T,
+    now: &Now<'_>,
+    points: Points<'_>,
+    work: &mut Workspace,
+) -> bool {
+    let n = points.shifts.len();
+    let at = Layout::dense(n);
+    let mut drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| twin.drift_points(now, at, x, dx);
+    let carry = |x: &mut [f64], work: &mut Workspace| {
+        twin.update_points(now, at, x);
+        work.jump_at(|tell| tell(now, twin.jumps(now)));
+        work.limit_to(|| twin.limits_at(now));
+        work.carry_refined(n, now, x, &mut drift);
+    };
+    let constrain = |x: &mut [f64]| twin.constrain_points(now, at, x);
+    advance_together(n, points, work, carry, constrain)
 }
 
 /// One step of one state without noise and limits: memories, then motion.

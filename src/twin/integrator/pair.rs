@@ -96,6 +96,27 @@ impl ExplicitPair {
         x.copy_from_slice(&self.stage);
     }
 
+    /// Sets `errors` to those of a step in which the states stand at `x`: of what changes with time alone.
+    pub fn errors_at_rest(
+        &mut self,
+        path: &mut Path<'_, '_>,
+        of: Stretch,
+        x: &[f64],
+        errors: &mut [f64],
+    ) {
+        let h = path.seconds(of);
+        let slope = &mut self.slopes[0];
+        slope.resize(x.len(), 0.0);
+        path.begin_step();
+        errors.fill(0.0);
+        for (node, weight) in NODES.into_iter().zip(DIFFERENCE) {
+            path.rates(of, node, x, slope);
+            for (error, slope) in errors.iter_mut().zip(&*slope) {
+                *error += h * weight * slope;
+            }
+        }
+    }
+
     /// Length of the last step with errors, times the largest rate of decay that is seen at its end (Hairer and Wanner, *Solving Ordinary
     /// Differential Equations II*, section IV.2): around [`STABLE`] where stability limits the step.
     pub fn reach(&self) -> f64 {

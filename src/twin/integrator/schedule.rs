@@ -94,7 +94,8 @@ struct Falls {
 }
 
 impl Falls {
-    fn see(&mut self, is_kept: bool, reach: f64) {
+    /// Sees the end of a step; `is_by_time` tells whether it failed by what changes with time, which all points meet at once.
+    fn see(&mut self, is_kept: bool, reach: f64, is_by_time: impl FnOnce() -> bool) {
         if is_kept {
             self.kept += 1;
             self.kept_in_row += 1;
@@ -104,7 +105,7 @@ impl Falls {
         }
         self.kept_in_row = 0;
         self.row += 1;
-        self.rows += usize::from(self.row == 2 && self.kept > 0);
+        self.rows += usize::from(self.row == 2 && self.kept > 0 && !is_by_time());
     }
 
     fn repeat(&self) -> bool {
@@ -372,7 +373,9 @@ impl SubstepSchedule {
             self.step(path, of, trial, Some(errors));
             path.limit_errors(of, trial, errors);
             let size = self.largest((x, trial), errors);
-            falls.see(size <= 1.0, self.explicit.reach());
+            falls.see(size <= 1.0, self.explicit.reach(), || {
+                self.is_by_time(path, of, (x, trial), size)
+            });
             // A single run goes on from jump to jump.
             if falls.kept_in_row == FEW && patience > FEW {
                 (settled, falls.rows) = (steps, 0);
@@ -414,21 +417,39 @@ impl SubstepSchedule {
         x.fill(f64::NAN);
     }
 
+    /// Returns whether half of a step's error, or more, is there while the states stand, too.
+    fn is_by_time(
+        &mut self,
+        path: &mut Path<'_, '_>,
+        of: Stretch,
+        (x, to): (&[f64], &[f64]),
+        error: f64,
+    ) -> bool {
+        let mut errors = vec![0.0; x.len()];
+        self.explicit.errors_at_rest(path, of, x, &mut errors);
+        path.limit_errors(of, to, &mut errors);
+        self.largest((x, to), &errors) > 0.5 * error
+    }
+
     /// Returns whether rates jump in steps of these lengths, beyond the tolerance: errors then grow in proportion to the length. Those of smooth rates
-    /// grow with its fifth power, those of stiff rates faster.
+    /// grow with its fifth power, those of stiff rates faster. Those of what changes with time alone, a short pulse say, are no jump: all points meet it
+    /// at one time, and shorter steps follow it.
     fn jumps(&mut self, path: &mut Path<'_, '_>, x: &[f64], from: f64, lengths: [f64; 2]) -> bool {
         // A jump that is told is none.
         let end = path.next_break(from) - from;
         let lengths = lengths.map(|length| length.min(end));
+        let mut is_by_time = false;
         let errors = lengths.map(|length| {
             let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
             let of = Stretch { from, length };
             self.explicit.step(path, of, &mut trial, Some(&mut errors));
             path.limit_errors(of, &trial, &mut errors);
-            self.largest((x, &trial), &errors)
+            let error = self.largest((x, &trial), &errors);
+            is_by_time |= self.is_by_time(path, of, (x, &trial), error);
+            error
         });
         let order = (errors[1] / errors[0]).ln() / (lengths[1] / lengths[0]).ln();
-        errors[0] > 1.0 && errors[1].is_finite() && order < 2.0
+        errors[0] > 1.0 && errors[1].is_finite() && order < 2.0 && !is_by_time
     }
 
     /// Keeps a step from `x` to `trial`, up to its first event, and moves `x`; returns the share of the way that is reached.

@@ -178,7 +178,13 @@ impl Workspace {
     }
 
     /// As [`carry`](Self::carry), not in one step of held inputs. One copy serves all equations: here a call costs little of a step.
-    fn carry_refined(&mut self, n: usize, now: &Now<'_>, x: &mut [f64], drift: &mut Rates<'_>) {
+    pub(in crate::twin) fn carry_refined(
+        &mut self,
+        n: usize,
+        now: &Now<'_>,
+        x: &mut [f64],
+        drift: &mut Rates<'_>,
+    ) {
         let Some(refined) = &mut self.refined else {
             return;
         };
