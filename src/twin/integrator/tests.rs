@@ -417,40 +417,40 @@ fn points_that_friction_stops_take_steps_of_one_length() {
     assert!(taken.substeps > 20 * 32, "{taken:?}");
 }
 
+/// Rates `force(t) − decay·x`, followed by several points and by one, are those of short steps.
+fn assert_followed(force: impl Fn(f64) -> f64, decay: f64, dt: f64) {
+    let rates = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
+        for (x, dx) in x.iter().zip(dx) {
+            *dx = force(now.t) - decay * x;
+        }
+    };
+    for points in [&[0.0, 0.1, -0.1][..], &[0.0]] {
+        let rule = (Integrator::Adaptive, Stepping::default());
+        let mut work = Workspace::of(&[], &[Interval::EVERYTHING], rule, &[]);
+        let (mut found, mut exact) = (points.to_vec(), points.to_vec());
+        let mut buffers = StepBuffers::of(1);
+        for k in 0..7 {
+            let t = f64::from(k) * dt;
+            work.carry(1, &Now::new(t, dt, &[], &[]), &mut found, rates);
+            let short = dt / 20_000.0;
+            for i in 0..20_000 {
+                let now = Now::new(t + f64::from(i) * short, short, &[], &[]);
+                Integrator::RungeKutta4.step(&now, &mut exact, &mut buffers, rates);
+            }
+            for (x, exact) in found.iter().zip(&exact) {
+                assert!((x - exact).abs() < 2e-6, "{points:?}, {k}: {x} {exact}");
+            }
+        }
+        let taken = work.steps_taken().unwrap();
+        assert!(taken.substeps < 4000, "{taken:?}");
+    }
+}
+
 /// What is steep in time alone is no jump that each point meets for itself: all follow it within the tolerance, from a state of zero, too.
 #[test]
 fn points_follow_what_is_steep_in_time() {
-    let (centre, width) = (9.93, 0.1225);
-    let pulse = |t: f64| (-((t - centre) / width).powi(2)).exp();
-    let waves = |t: f64| (30.0 * (1.37 * t).sin()).tanh();
-    let systems: [(&dyn Fn(f64) -> f64, f64, f64); 2] = [(&pulse, 0.0, 2.0), (&waves, 1.0, 1.0)];
-    for (force, decay, dt) in systems {
-        let rates = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
-            for (x, dx) in x.iter().zip(dx) {
-                *dx = force(now.t) - decay * x;
-            }
-        };
-        for points in [&[0.0, 0.1, -0.1][..], &[0.0]] {
-            let rule = (Integrator::Adaptive, Stepping::default());
-            let mut work = Workspace::of(&[], &[Interval::EVERYTHING], rule, &[]);
-            let (mut found, mut exact) = (points.to_vec(), points.to_vec());
-            let mut buffers = StepBuffers::of(1);
-            for k in 0..7 {
-                let t = f64::from(k) * dt;
-                work.carry(1, &Now::new(t, dt, &[], &[]), &mut found, rates);
-                let short = dt / 20_000.0;
-                for i in 0..20_000 {
-                    let now = Now::new(t + f64::from(i) * short, short, &[], &[]);
-                    Integrator::RungeKutta4.step(&now, &mut exact, &mut buffers, rates);
-                }
-                for (x, exact) in found.iter().zip(&exact) {
-                    assert!((x - exact).abs() < 2e-6, "{points:?}, {k}: {x} {exact}");
-                }
-            }
-            let taken = work.steps_taken().unwrap();
-            assert!(taken.substeps < 4000, "{taken:?}");
-        }
-    }
+    assert_followed(|t| (-((t - 9.93) / 0.1225).powi(2)).exp(), 0.0, 2.0);
+    assert_followed(|t| (30.0 * (1.37 * t).sin()).tanh(), 1.0, 1.0);
 }
 
 /// An outflow by the root of a level that runs empty is steep, and not stiff.
