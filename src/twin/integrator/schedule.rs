@@ -374,7 +374,7 @@ impl SubstepSchedule {
             path.limit_errors(of, trial, errors);
             let size = self.largest((x, trial), errors);
             falls.see(size <= 1.0, self.explicit.reach(), || {
-                self.is_by_time(path, of, (x, trial), size)
+                self.is_by_time(path, of, (x, trial), errors)
             });
             // A single run goes on from jump to jump.
             if falls.kept_in_row == FEW && patience > FEW {
@@ -417,18 +417,25 @@ impl SubstepSchedule {
         x.fill(f64::NAN);
     }
 
-    /// Returns whether half of a step's error, or more, is there while the states stand, too.
+    /// Returns whether half of the worst of a step's errors, or more, is there for each point while the states stand, too. Where each point meets a
+    /// jump at its own time, some have nothing of it in a step that is short enough.
     fn is_by_time(
         &mut self,
         path: &mut Path<'_, '_>,
         of: Stretch,
         (x, to): (&[f64], &[f64]),
-        error: f64,
+        errors: &[f64],
     ) -> bool {
-        let mut errors = vec![0.0; x.len()];
-        self.explicit.errors_at_rest(path, of, x, &mut errors);
-        path.limit_errors(of, to, &mut errors);
-        self.largest((x, to), &errors) > 0.5 * error
+        let shares = self.shares((x, to), errors).enumerate();
+        let Some((worst, _)) = shares.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return false;
+        };
+        let (n, half) = (self.sizes.len(), 0.5 * errors[worst].abs());
+        let mut at_rest = vec![0.0; x.len()];
+        self.explicit.errors_at_rest(path, of, x, &mut at_rest);
+        path.limit_errors(of, to, &mut at_rest);
+        let mut of_points = at_rest.iter().skip(worst % n).step_by(n);
+        of_points.all(|error| error.abs() >= half)
     }
 
     /// Returns whether rates jump in steps of these lengths, beyond the tolerance: errors then grow in proportion to the length. Those of smooth rates
@@ -444,9 +451,8 @@ impl SubstepSchedule {
             let of = Stretch { from, length };
             self.explicit.step(path, of, &mut trial, Some(&mut errors));
             path.limit_errors(of, &trial, &mut errors);
-            let error = self.largest((x, &trial), &errors);
-            is_by_time |= self.is_by_time(path, of, (x, &trial), error);
-            error
+            is_by_time |= self.is_by_time(path, of, (x, &trial), &errors);
+            self.largest((x, &trial), &errors)
         });
         let order = (errors[1] / errors[0]).ln() / (lengths[1] / lengths[0]).ln();
         errors[0] > 1.0 && errors[1].is_finite() && order < 2.0 && !is_by_time
@@ -562,25 +568,26 @@ impl SubstepSchedule {
         }
     }
 
-    /// Largest error of a step of any point over the tolerance of its state.
-    fn largest(&self, (from, to): (&[f64], &[f64]), errors: &[f64]) -> f64 {
+    /// Errors of a step over the tolerance of their states.
+    fn shares(&self, (from, to): (&[f64], &[f64]), errors: &[f64]) -> impl Iterator<Item = f64> {
         let n = self.sizes.len();
-        let mut largest: f64 = 0.0;
-        let points = from.chunks_exact(n).zip(to.chunks_exact(n));
-        for ((from, to), errors) in points.zip(errors.chunks_exact(n)) {
-            for (i, error) in errors.iter().enumerate() {
-                if *error == 0.0 {
-                    continue;
-                }
-                let size = self.sizes[i].max(from[i].abs()).max(to[i].abs());
-                let share = error.abs() / (self.tolerance * size);
-                if !share.is_finite() {
-                    return f64::INFINITY;
-                }
-                largest = largest.max(share);
+        (errors.iter().zip(from).zip(to).enumerate()).map(move |(k, ((error, from), to))| {
+            if *error == 0.0 {
+                return 0.0;
             }
-        }
-        largest
+            let size = self.sizes[k % n].max(from.abs()).max(to.abs());
+            let share = error.abs() / (self.tolerance * size);
+            if share.is_finite() {
+                share
+            } else {
+                f64::INFINITY
+            }
+        })
+    }
+
+    /// Largest of the [`shares`](Self::shares) of all points.
+    fn largest(&self, points: (&[f64], &[f64]), errors: &[f64]) -> f64 {
+        self.shares(points, errors).fold(0.0, f64::max)
     }
 }
 

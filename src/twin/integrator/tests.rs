@@ -453,6 +453,25 @@ fn points_follow_what_is_steep_in_time() {
     assert_followed(|t| (30.0 * (1.37 * t).sin()).tanh(), 1.0, 1.0);
 }
 
+/// What turns round where a state passes a wave is met by each point at its own time, and takes steps of one length.
+#[test]
+fn points_that_pass_a_wave_take_steps_of_one_length() {
+    let rates = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
+        for (x, dx) in x.iter().zip(dx) {
+            *dx = -(x - (3.0 * now.t).sin()).signum() - 0.1 * x;
+        }
+    };
+    let mut points = [0.0, 0.02, -0.02, 0.05, -0.05];
+    let rule = (Integrator::Adaptive, Stepping::default());
+    let mut work = Workspace::of(&[], &[Interval::EVERYTHING], rule, &[]);
+    for k in 0..60 {
+        let now = Now::new(f64::from(k) * 0.05, 0.05, &[], &[]);
+        work.carry(1, &now, &mut points, rates);
+    }
+    let taken = work.steps_taken().unwrap();
+    assert_eq!((taken.implicit, taken.most), (0, 32), "{taken:?}");
+}
+
 /// An outflow by the root of a level that runs empty is steep, and not stiff.
 #[test]
 fn what_is_steep_at_one_place_stays_explicit() {
