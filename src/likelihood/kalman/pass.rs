@@ -128,21 +128,20 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         let readings: Vec<Option<Readings>> = (jobs.iter())
             .map(|job| Readings::of(&kalman.twin, job.theta))
             .collect();
-        let mut floor = S::Vector::zeros(p);
-        for (j, floor) in floor.numbers_mut()[..p].iter_mut().enumerate() {
-            *floor = N::of_lanes(|lane| {
-                let i = held_by(lane, jobs.len());
-                let rounds = readings[i].as_ref().is_some_and(|r| r.rounds(j));
-                match rounds {
-                    true => jobs[i].kalman.floor[j],
-                    false => jobs[i].kalman.unrounded[j],
-                }
-            });
-        }
-        let mut jitter = S::Vector::zeros(p);
-        for (j, jitter) in jitter.numbers_mut()[..p].iter_mut().enumerate() {
-            *jitter = N::of_lanes(|lane| jobs[held_by(lane, jobs.len())].kalman.jitter[j]);
-        }
+        let by_output = |of: &dyn Fn(usize, usize) -> f64| {
+            let mut values = S::Vector::zeros(p);
+            for (j, value) in values.numbers_mut()[..p].iter_mut().enumerate() {
+                *value = N::of_lanes(|lane| of(held_by(lane, jobs.len()), j));
+            }
+            values
+        };
+        let floor = by_output(
+            &|i, j| match readings[i].as_ref().is_some_and(|r| r.rounds(j)) {
+                true => jobs[i].kalman.floor[j],
+                false => jobs[i].kalman.unrounded[j],
+            },
+        );
+        let jitter = by_output(&|i, j| jobs[i].kalman.jitter[j]);
         let now: Vec<Now<'_>> = (jobs.iter()).map(|job| job.acting.at(0)).collect();
         let theta = |lane| now[held_by(lane, jobs.len())].theta;
         let factors = kalman.twin.level_factors(theta);

@@ -1,6 +1,9 @@
 //! Substeps to a tolerance: chosen for the points of a filter together and taken by all of them, so that what is between two samples is one smooth
 //! function for all of them, and for all θ of the passes that go side by side.
 
+mod roughness;
+mod taken;
+
 use super::event_calls::{EventsOfWay, StepBy};
 use super::jump::{JumpsSeen, step_with_jumps};
 use super::pair::{self, ExplicitPair};
@@ -8,9 +11,9 @@ use super::path::{Path, Stretch};
 use super::rosenbrock::{self, Rosenbrock};
 use super::rule::{Integrator, MOST_SUBSTEPS, Stepping};
 use super::watch::EventWatch;
-use crate::math::three_digits;
 use crate::setting::number;
-use serde::Serialize;
+use roughness::{Falls, JUMPS};
+pub use taken::StepsTaken;
 
 /// Share of the longest step that the tolerance allows: a step that fails costs as much as one that does not.
 const SAFETY: f64 = 0.9;
@@ -19,104 +22,15 @@ const CHANGE: (f64, f64) = (0.2, 5.0);
 /// Explicit steps of one sample, at the limit of their stability, from which the implicit method is tried, whose step costs some three of these with
 /// few states. Twice as many find stiffness later; half tries it where few steps would do.
 const MANY: usize = 32;
-/// Lengths of two steps that tell rates that jump from those that are stiff, over the length that the tolerance allows: both are beyond it, and
-/// not so far that all detail is lost.
-const JUMPS: [f64; 2] = [2.0, 16.0];
 /// Steps of one sample of several points after which jumps of rates are no longer followed, as each point meets them at its own time. Half
 /// gives up before a jump that all meet at one time is located, twice as many cost twice. Of a single run [`MANY`] times as many, as a jump is
 /// located in some thirty.
 const FEW: usize = 8;
-/// Least number of steps of one length in a sample where rates jump again and again, as dry friction does: jumps are met within a step, all else has
-/// its second order. Twice as many change the evidence of a sled with friction by 0.03 nats, and take twice the time.
-const EVEN: usize = 4;
 /// Least factor in the number of steps by which the implicit method wins: what its steps cost more.
 const WORTH: f64 = 4.0;
 
 /// Shortest step, as a share of the way to the next sample: a hundred times what rounding leaves of times.
 const SHORTEST: f64 = 1e-12;
-
-/// Adaptive substeps between the samples of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-#[non_exhaustive]
-pub struct StepsTaken {
-    /// Samples.
-    pub samples: usize,
-    /// Substeps of all of them.
-    pub substeps: usize,
-    /// Most substeps of one.
-    pub most: usize,
-    /// Samples with implicit steps.
-    pub implicit: usize,
-}
-
-impl StepsTaken {
-    /// Those of two runs.
-    pub(crate) fn and(self, other: Self) -> Self {
-        Self {
-            samples: self.samples + other.samples,
-            substeps: self.substeps + other.substeps,
-            most: self.most.max(other.most),
-            implicit: self.implicit + other.implicit,
-        }
-    }
-
-    /// Substeps of a sample, rounded up.
-    pub(crate) fn mean(self) -> usize {
-        self.substeps.div_ceil(self.samples.max(1))
-    }
-
-    /// As a sentence has them: `adaptive steps, 3.4 a sample, at most 12`.
-    pub(crate) fn text(self) -> String {
-        let mean = three_digits(self.substeps as f64 / self.samples.max(1) as f64);
-        let implicit = match self.implicit {
-            0 => String::new(),
-            many if many == self.samples => ", all implicit".into(),
-            many => format!(", implicit for {many} of {} samples", self.samples),
-        };
-        format!(
-            "adaptive steps, {mean} a sample, at most {}{implicit}",
-            self.most
-        )
-    }
-}
-
-/// Steps of a sample that fail and that do not: where rates jump, several in a row fail each time that a point meets the jump.
-#[derive(Debug, Default)]
-struct Falls {
-    kept: usize,
-    /// Kept steps that end where an explicit method is no longer stable.
-    unstable: usize,
-    /// Failures in a row, and rows of two behind the first kept step.
-    row: usize,
-    rows: usize,
-    /// Kept steps in a row.
-    kept_in_row: usize,
-}
-
-impl Falls {
-    /// Sees the end of a step; `is_by_time` tells whether it failed by what changes with time, which all points meet at once.
-    fn see(&mut self, is_kept: bool, reach: f64, is_by_time: impl FnOnce() -> bool) {
-        if is_kept {
-            self.kept += 1;
-            self.kept_in_row += 1;
-            self.unstable += usize::from(reach > pair::STABLE);
-            self.row = 0;
-            return;
-        }
-        self.kept_in_row = 0;
-        self.row += 1;
-        self.rows += usize::from(self.row == 2 && self.kept > 0 && !is_by_time());
-    }
-
-    fn repeat(&self) -> bool {
-        self.rows > 1
-    }
-
-    /// Returns whether the steps are short because rates are stiff.
-    fn are_stiff(&self) -> bool {
-        2 * self.unstable > self.kept
-    }
-}
 
 /// Outcome of steps to a tolerance.
 enum SampleSteps {
@@ -417,47 +331,6 @@ impl SubstepSchedule {
         x.fill(f64::NAN);
     }
 
-    /// Returns whether half of the worst of a step's errors, or more, is there for each point while the states stand, too. Where each point meets a
-    /// jump at its own time, some have nothing of it in a step that is short enough.
-    fn is_by_time(
-        &mut self,
-        path: &mut Path<'_, '_>,
-        of: Stretch,
-        (x, to): (&[f64], &[f64]),
-        errors: &[f64],
-    ) -> bool {
-        let shares = self.shares((x, to), errors).enumerate();
-        let Some((worst, _)) = shares.max_by(|a, b| a.1.total_cmp(&b.1)) else {
-            return false;
-        };
-        let (n, half) = (self.sizes.len(), 0.5 * errors[worst].abs());
-        let mut at_rest = vec![0.0; x.len()];
-        self.explicit.errors_at_rest(path, of, x, &mut at_rest);
-        path.limit_errors(of, to, &mut at_rest);
-        let mut of_points = at_rest.iter().skip(worst % n).step_by(n);
-        of_points.all(|error| error.abs() >= half)
-    }
-
-    /// Returns whether rates jump in steps of these lengths, beyond the tolerance: errors then grow in proportion to the length. Those of smooth rates
-    /// grow with its fifth power, those of stiff rates faster. Those of what changes with time alone, a short pulse say, are no jump: all points meet it
-    /// at one time, and shorter steps follow it.
-    fn jumps(&mut self, path: &mut Path<'_, '_>, x: &[f64], from: f64, lengths: [f64; 2]) -> bool {
-        // A jump that is told is none.
-        let end = path.next_break(from) - from;
-        let lengths = lengths.map(|length| length.min(end));
-        let mut is_by_time = false;
-        let errors = lengths.map(|length| {
-            let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
-            let of = Stretch { from, length };
-            self.explicit.step(path, of, &mut trial, Some(&mut errors));
-            path.limit_errors(of, &trial, &mut errors);
-            is_by_time |= self.is_by_time(path, of, (x, &trial), &errors);
-            self.largest((x, &trial), &errors)
-        });
-        let order = (errors[1] / errors[0]).ln() / (lengths[1] / lengths[0]).ln();
-        errors[0] > 1.0 && errors[1].is_finite() && order < 2.0 && !is_by_time
-    }
-
     /// Keeps a step from `x` to `trial`, up to its first event, and moves `x`; returns the share of the way that is reached.
     fn keep(
         &mut self,
@@ -519,46 +392,6 @@ impl SubstepSchedule {
         }
     }
 
-    /// Least number of steps of one length: more where states have limits, which act at their ends, where rates change with time, since jumps are looked for
-    /// at one time of a step, and where rates are stiff. With a quarter of these a level that turns at its limit ends half a hundredth of its range off.
-    /// Explicit steps are as short as the fastest state asks for.
-    fn even(&self, path: &mut Path<'_, '_>, x: &[f64]) -> usize {
-        let way = Stretch {
-            from: 0.0,
-            length: 1.0,
-        };
-        let (has_limits, seconds) = (path.limits.is_some(), path.seconds(way));
-        let mut at = |part: f64, x: &[f64]| {
-            let mut rates = vec![0.0; x.len()];
-            path.rates(way, part, x, &mut rates);
-            rates
-        };
-        let first = at(0.0, x);
-        let is_still = first == at(1.0, x);
-        if has_limits || self.is_implicit || !is_still {
-            return 8 * EVEN;
-        }
-        let n = self.sizes.len();
-        let mut fastest = vec![0.0; x.len()];
-        for j in 0..n {
-            let mut beside = |shares: f64| {
-                let mut x = x.to_vec();
-                let states = x.iter_mut().skip(j).step_by(n);
-                states.for_each(|x| *x += shares * 1e-6 * self.sizes[j]);
-                at(0.0, &x)
-            };
-            let (near, next) = (beside(1.0), beside(2.0));
-            for (i, fastest) in fastest.iter_mut().enumerate() {
-                // A jump is in one change of both.
-                let change = (near[i] - first[i]).abs().min((next[i] - near[i]).abs());
-                let rate = change / (1e-6 * self.sizes[i % n]);
-                *fastest += if rate.is_finite() { rate } else { 0.0 };
-            }
-        }
-        let fastest = fastest.into_iter().fold(0.0, f64::max);
-        ((2.0 * fastest * seconds).ceil() as usize).clamp(EVEN, 8 * EVEN)
-    }
-
     /// Remembers the largest size of each state of the centre.
     fn see(&mut self, x: &[f64]) {
         for (size, x) in self.sizes.iter_mut().zip(x) {
@@ -566,28 +399,6 @@ impl SubstepSchedule {
                 *size = size.max(x.abs());
             }
         }
-    }
-
-    /// Errors of a step over the tolerance of their states.
-    fn shares(&self, (from, to): (&[f64], &[f64]), errors: &[f64]) -> impl Iterator<Item = f64> {
-        let n = self.sizes.len();
-        (errors.iter().zip(from).zip(to).enumerate()).map(move |(k, ((error, from), to))| {
-            if *error == 0.0 {
-                return 0.0;
-            }
-            let size = self.sizes[k % n].max(from.abs()).max(to.abs());
-            let share = error.abs() / (self.tolerance * size);
-            if share.is_finite() {
-                share
-            } else {
-                f64::INFINITY
-            }
-        })
-    }
-
-    /// Largest of the [`shares`](Self::shares) of all points.
-    fn largest(&self, points: (&[f64], &[f64]), errors: &[f64]) -> f64 {
-        self.shares(points, errors).fold(0.0, f64::max)
     }
 }
 

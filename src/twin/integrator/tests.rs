@@ -446,14 +446,14 @@ fn assert_followed(force: impl Fn(f64) -> f64, decay: f64, dt: f64) {
     }
 }
 
-/// What is steep in time alone is no jump that each point meets for itself: all follow it within the tolerance, from a state of zero, too.
+/// Rates that are steep in time alone are no jump that each point meets for itself: all follow them within the tolerance, from a state of zero, too.
 #[test]
 fn points_follow_what_is_steep_in_time() {
     assert_followed(|t| (-((t - 9.93) / 0.1225).powi(2)).exp(), 0.0, 2.0);
     assert_followed(|t| (30.0 * (1.37 * t).sin()).tanh(), 1.0, 1.0);
 }
 
-/// What turns round where a state passes a wave is met by each point at its own time, and takes steps of one length.
+/// Rates that turn round where a state passes a wave are met by each point at its own time, and take steps of one length.
 #[test]
 fn points_that_pass_a_wave_take_steps_of_one_length() {
     let rates = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
