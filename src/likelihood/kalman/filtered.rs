@@ -3,8 +3,7 @@
 use super::gaussian::{Belief, Gaussian};
 use super::likelihood::LOG_TWO_PI;
 use super::order::Order;
-use super::pass::{Innovation, Pass, Sink};
-use super::run::AnyPass;
+use super::pass::{AnyPass, Innovation, Pass, Sink};
 use super::size::Any;
 use super::{FilterError, Kalman};
 use crate::record::Signal;

@@ -92,10 +92,26 @@ pub(super) struct Pass<'k, S: Size, N: FilterNumber> {
     valid: N::Condition,
 }
 
-impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
-    /// `true` if rows of full rank are compiled apart. Lanes would change bits of each other.
-    const REGULAR_APART: bool = S::KNOWN && N::LANES == 1;
+/// A pass of any size, which goes on in blocks of rows.
+pub(super) trait AnyPass<N>: Send {
+    /// Goes on through the rows before `end`.
+    fn run_to(&mut self, end: usize, sink: &mut dyn Sink<N>) -> Result<(), FilterError>;
 
+    /// log p of the rows so far, in nats; NaN in lanes that failed.
+    fn log_likelihood(&self) -> N;
+}
+
+impl<S: Size> AnyPass<f64> for Pass<'_, S, f64> {
+    fn run_to(&mut self, end: usize, sink: &mut dyn Sink) -> Result<(), FilterError> {
+        Pass::run_to(self, end, sink)
+    }
+
+    fn log_likelihood(&self) -> f64 {
+        Pass::log_likelihood(self)
+    }
+}
+
+impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
     /// Before the first row.
     pub fn new(size: S, jobs: &'k [FilterJob<'k>]) -> Self {
         let mut pass = Self::prepared(size, jobs);
@@ -276,15 +292,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         }
         let good = match self.regular(state) {
             Some(columns) => self.update_state(state, Columns::all(n, columns.numbers())),
-            None if Self::REGULAR_APART => {
-                self.copy.set(state.belief(n));
-                let good = self.update_singular(root);
-                state.set(self.copy.belief(n));
-                good
-            }
             None => {
-                let Belief { mean, cov } = state.belief(n);
-                root.factor(mean, cov);
+                self.factor(state, root);
                 self.update_state(state, root.columns())
             }
         };
@@ -378,14 +387,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 let all = Columns::all(n, columns.numbers());
                 self.predict(k, state, all, sink);
             }
-            None if Self::REGULAR_APART => {
-                self.copy.set(state.belief(n));
-                self.predict_singular(k, root, sink);
-                state.set(self.copy.belief(n));
-            }
             None => {
-                let Belief { mean, cov } = state.belief(n);
-                root.factor(mean, cov);
+                self.factor(state, root);
                 self.predict(k, state, root.columns(), sink);
             }
         }
@@ -418,47 +421,30 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         }
     }
 
-    /// As [`update_state`](Self::update_state), of the copy and any rank: a call, so that the loop holds the rows of full rank alone.
-    #[inline(never)]
-    fn update_singular(&mut self, root: &mut Root<S::Matrix<N>>) -> N::Condition {
-        let mut state = self.take_copy(root);
-        let good = self.update_state(&mut state, root.columns());
-        self.copy = state;
-        good
-    }
-
-    /// As [`predict`](Self::predict), of the copy and any rank.
-    #[inline(never)]
-    fn predict_singular(
-        &mut self,
-        k: usize,
-        root: &mut Root<S::Matrix<N>>,
-        sink: &mut dyn Sink<N>,
-    ) {
-        let mut state = self.take_copy(root);
-        self.predict(k, &mut state, root.columns(), sink);
-        self.copy = state;
-    }
-
-    /// The copy, whose covariance is factored.
-    #[inline(always)]
-    fn take_copy(&mut self, root: &mut Root<S::Matrix<N>>) -> FilterState<S, N> {
-        let n = self.size.states();
-        let Belief { mean, cov } = self.copy.belief(n);
-        root.factor(mean, cov);
-        std::mem::replace(&mut self.copy, FilterState::zero(n))
-    }
-
-    /// Cholesky's columns of the covariance where all its pivots count, as they mostly do. What follows finds the columns in registers.
+    /// Cholesky's columns of the covariance where all its pivots count, as they mostly do. What follows is compiled for
+    /// this rank apart, and finds the columns in registers. Lanes would change bits of each other.
     #[inline(always)]
     fn regular(&self, state: &FilterState<S, N>) -> Option<S::Matrix<N>> {
         let n = self.size.states();
-        if !Self::REGULAR_APART {
+        if !S::KNOWN || N::LANES > 1 {
             return None;
         }
         let mut columns = S::Matrix::zeros(n * n);
         let Belief { mean, cov } = state.belief(n);
         regular(mean, cov, columns.numbers_mut()).then_some(columns)
+    }
+
+    /// The root of any covariance.
+    #[inline(always)]
+    fn factor(&mut self, state: &FilterState<S, N>, root: &mut Root<S::Matrix<N>>) {
+        let n = self.size.states();
+        let mut at = state.belief(n);
+        if N::LANES == 1 {
+            // Of a copy: what a call has seen leaves the registers.
+            self.copy.set(at);
+            at = self.copy.belief(n);
+        }
+        root.factor(at.mean, at.cov);
     }
 
     #[inline(always)]

@@ -5,32 +5,13 @@ mod start;
 
 use super::normal::clip::clip;
 use super::order::Order;
-use super::pass::{FilterJob, Pass, Sink};
-use super::size::{Any, Size, with_size};
+use super::pass::{AnyPass, FilterJob, Pass, Sink};
+use super::size::{Any, with_size};
 use super::{FilterError, Kalman};
 use crate::twin::{Acting, Now};
 
 pub(super) use beside::{LaneRows, SideBySide};
 pub(super) use start::spread_start;
-
-/// A pass of any size, which goes on in blocks of rows.
-pub(super) trait AnyPass<N>: Send {
-    /// Goes on through the rows before `end`.
-    fn run_to(&mut self, end: usize, sink: &mut dyn Sink<N>) -> Result<(), FilterError>;
-
-    /// log p of the rows so far, in nats; NaN in lanes that failed.
-    fn log_likelihood(&self) -> N;
-}
-
-impl<S: Size> AnyPass<f64> for Pass<'_, S, f64> {
-    fn run_to(&mut self, end: usize, sink: &mut dyn Sink) -> Result<(), FilterError> {
-        Pass::run_to(self, end, sink)
-    }
-
-    fn log_likelihood(&self) -> f64 {
-        Pass::log_likelihood(self)
-    }
-}
 
 impl Kalman<'_> {
     /// The record's drive as the twin sees it at θ, which is checked.

@@ -1,4 +1,4 @@
-//! What a pass shows of each row.
+//! Results of a row, and who takes them.
 
 use crate::likelihood::kalman::gaussian::Belief;
 use crate::likelihood::kalman::likelihood::LOG_TWO_PI;

@@ -5,8 +5,7 @@
 //! first lane chooses.
 
 use crate::likelihood::kalman::order::Order;
-use crate::likelihood::kalman::pass::{FilterJob, Innovation, Pass, Sink};
-use crate::likelihood::kalman::run::AnyPass;
+use crate::likelihood::kalman::pass::{AnyPass, FilterJob, Innovation, Pass, Sink};
 use crate::likelihood::kalman::size::{Any, Size, with_size};
 use crate::likelihood::kalman::update::Readings;
 use crate::likelihood::kalman::{FilterError, Filtered, Kalman, Method, recoverable};

@@ -3,8 +3,8 @@
 mod response;
 
 use super::order::Order;
-use super::pass::{FilterJob, Innovation, Sink};
-use super::run::{AnyPass, LaneRows, SideBySide};
+use super::pass::{AnyPass, FilterJob, Innovation, Sink};
+use super::run::{LaneRows, SideBySide};
 use super::{Coordinates, FilterError, Kalman};
 use crate::math::{LANES, Lanes, Stencil};
 use nalgebra::{DMatrix, DMatrixView, DVector};
