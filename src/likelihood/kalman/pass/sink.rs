@@ -47,18 +47,14 @@ impl Innovation<'_> {
 /// Receiver of the results of a pass. Results that it does not need are not computed.
 pub(in crate::likelihood::kalman) trait Sink<N = f64> {
     /// Returns `true` if [`carried`](Self::carried) is wanted.
-    #[inline(always)]
     fn wants_carried(&self) -> bool {
         false
     }
     /// Takes that of row i in the [`Order`] of the filter.
-    #[inline(always)]
     fn innovation(&mut self, _i: usize, _of: &Innovation<'_, N>) {}
     /// State given rows up to k.
-    #[inline(always)]
     fn filtered(&mut self, _k: usize, _state: Belief<'_, N>) {}
     /// State of row k + 1 given rows up to k, and cov(x_k, x_{k+1}).
-    #[inline(always)]
     fn carried(&mut self, _k: usize, _next: Belief<'_, N>, _cross: &[N]) {}
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Falls {
     kept: usize,
     /// Kept steps that end where an explicit method is no longer stable.
     unstable: usize,
-    /// Failures in a row, and rows of two behind the first kept step.
+    /// Failures in a row, and rows of two behind the first kept step that are not by time.
     row: usize,
     pub rows: usize,
     /// Kept steps in a row.
@@ -51,7 +51,7 @@ impl Falls {
 
 impl SubstepSchedule {
     /// Returns whether half of the worst of a step's errors, or more, is there for each point while the states stand, too. Where each point meets a
-    /// jump at its own time, some have nothing of it in a step that is short enough.
+    /// jump at its own time, some points have no error there once the step is short.
     pub(super) fn is_by_time(
         &mut self,
         path: &mut Path<'_, '_>,
