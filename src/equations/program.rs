@@ -40,7 +40,7 @@ pub(super) struct Tapes {
 /// are computed for what fills a group up, too.
 const FEW: usize = 2;
 /// Numbers of a group of many points, those of the widest vectors.
-const MANY: usize = 8;
+const MANY: usize = LANES;
 /// Points from which on wide groups are no slower than narrow ones.
 const MANY_POINTS: usize = 40;
 

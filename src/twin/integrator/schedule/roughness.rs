@@ -84,17 +84,20 @@ impl SubstepSchedule {
         // A jump that is told is none.
         let end = path.next_break(from) - from;
         let lengths = lengths.map(|length| length.min(end));
-        let mut is_by_time = false;
-        let errors = lengths.map(|length| {
+        let steps = lengths.map(|length| {
             let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
             let of = Stretch { from, length };
             self.explicit.step(path, of, &mut trial, Some(&mut errors));
             path.limit_errors(of, &trial, &mut errors);
-            is_by_time |= self.is_by_time(path, of, (x, &trial), &errors);
-            self.largest((x, &trial), &errors)
+            (of, trial, errors)
         });
+        let errors = (steps.each_ref()).map(|(_, trial, errors)| self.largest((x, trial), errors));
         let order = (errors[1] / errors[0]).ln() / (lengths[1] / lengths[0]).ln();
-        errors[0] > 1.0 && errors[1].is_finite() && order < 2.0 && !is_by_time
+        errors[0] > 1.0
+            && errors[1].is_finite()
+            && order < 2.0
+            && !(steps.iter())
+                .any(|(of, trial, errors)| self.is_by_time(path, *of, (x, trial), errors))
     }
 
     /// Least number of steps of one length: more where states have limits, which act at their ends, where rates change with time, since jumps are looked for
