@@ -419,6 +419,42 @@ fn likelihoods_across_events_are_smooth() {
     }
 }
 
+/// Belts that turn round meet each point at its own time, hold it for long or let it pass: whether or not the twin has an event as well, the likelihood is
+/// that of 500 steps a row.
+#[test]
+fn points_meet_their_own_jumps_beside_an_event() {
+    for (rate, dt) in [
+        ("-4*sign(v - sin(3*t))", 0.05),
+        ("-sign(v - sin(3*t))", 0.2),
+        ("-sign(v - 0.3*sin(20*t))", 0.1),
+    ] {
+        let belt = format!(
+            "[parameters]\nc = {{ prior = [0.05, 0.2] }}\n[states]\n\
+            v = {{ rate = \"{rate} - c*v\", start = {{ mean = 0.0, std = 0.05 }}, noise = 0.02 }}\n\
+            [outputs]\ny = {{ value = \"v\", noise = 0.02 }}\n"
+        );
+        let event = format!("{belt}[[event]]\nwhen = \"v > 10\"\nset = {{ v = 0 }}\n");
+        let drive = Drive::autonomous(dt, 60).unwrap();
+        let short = "runge-kutta-4\"\nsubsteps = 500\n#\"";
+        let simulated = under(short, &belt).simulate(&[0.1], &drive, Noise::new(3, "texts", 0));
+        let record = Record::new(drive, simulated.unwrap()).unwrap();
+        let of = |rule: &str, text: &str| {
+            let twin = Arc::new(under(rule, text)).equations().unwrap();
+            let settings = FilterSettings::default();
+            let filter = Kalman::new(twin, &record, &settings).unwrap();
+            filter.log_likelihood(&[0.1]).unwrap()
+        };
+        let expected = of(short, &belt);
+        for text in [&belt, &event] {
+            let found = of("adaptive", text);
+            assert!(
+                (found - expected).abs() < 0.05,
+                "{rate}: {found} {expected}"
+            );
+        }
+    }
+}
+
 #[test]
 fn faults_of_events_have_their_place() {
     let problem = |events: &str| {

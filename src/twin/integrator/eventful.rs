@@ -76,10 +76,7 @@ impl Workspace {
         let mut watches = self.events.begin(&events, &mut path, x.chunks_exact_mut(n));
         let of_centre = Some((&events, watches[0].clone()));
         let stretches = match &mut self.schedule {
-            Some(schedule) => {
-                let way = (&mut path, x.len() > n);
-                schedule.chosen(way, &mut x[..n].to_vec(), &of_centre)
-            }
+            Some(schedule) => schedule.chosen(&mut path, x, &of_centre),
             None => path.equal(refined.substeps),
         };
         if stretches.is_empty() {

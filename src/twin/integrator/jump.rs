@@ -11,7 +11,7 @@
 //! the begin on. Shares are found by halves, or at once where a jump is met again where it was before. A rate jumps once in a step; jumps of several
 //! rates are met one after the other, so that two blocks come to rest each on its own. Where an implicit rule is given, it takes the step.
 //!
-//! All rates of a step are those in its middle.
+//! Rates are those of the time that belongs to a share: what is held is at the end where the jump is at the end, as on a belt that turns round.
 //!
 //! Sources: Filippov, *Differential Equations with Discontinuous Righthand Sides* (1988), section 4; Acary and Brogliato, *Implicit Euler numerical
 //! scheme and chattering-free implementation of sliding mode systems*, Systems & Control Letters 59 (2010) 284–293.
@@ -89,7 +89,7 @@ impl Step<'_> {
 
     /// Ways by the rates and their slopes. Those of an implicit rule are straight, and lead to where it does what is stiff: rates at the begin lead far off.
     fn ways(&self, path: &mut Path<'_, '_>, implicit: Option<&mut StepBy<'_>>) -> Ways {
-        let first = self.rates(path, self.begin);
+        let first = self.rates(path, 0.0, self.begin);
         let mut ways = Ways {
             way: first.clone(),
             slopes: vec![],
@@ -117,7 +117,7 @@ impl Step<'_> {
     /// Slopes of the rates along straight ways.
     fn slopes(&self, path: &mut Path<'_, '_>, ways: &Ways) -> Vec<f64> {
         let looks = [NEAR, 2.0 * NEAR, 0.5, 1.0];
-        let looks = looks.map(|share| self.rates(path, &self.ahead(ways, share)));
+        let looks = looks.map(|share| self.rates(path, share, &self.ahead(ways, share)));
         let of = |(i, first): (usize, &f64)| slope(*first, looks.each_ref().map(|all| all[i]));
         ways.first.iter().enumerate().map(of).collect()
     }
@@ -131,7 +131,8 @@ impl Step<'_> {
         looked: &mut [bool],
     ) -> Vec<Bracket> {
         let n = self.n;
-        let [middle, last] = [0.5, 1.0].map(|share| self.rates(path, &self.ahead(ways, share)));
+        let [middle, last] =
+            [0.5, 1.0].map(|share| self.rates(path, share, &self.ahead(ways, share)));
         let mut passing = vec![];
         for at in (0..self.begin.len()).step_by(n) {
             let of_point = |all: &[f64]| Few::from_slice(&all[at..at + n]);
@@ -183,7 +184,11 @@ impl Step<'_> {
                 ends[bracket.at + i] += self.h * bracket.passed(i, behind);
             }
         }
-        let [onwards, ends] = [onwards, ends].map(|x| self.rates(path, &x));
+        let times: Vec<_> = (passing.iter())
+            .map(|b| (b.at, (b.shares[1] + NEAR).min(1.0)))
+            .collect();
+        let onwards = self.rates_at(path, &times, &onwards);
+        let ends = self.rates(path, 1.0, &ends);
         let (mut means, mut jumps) = (vec![], vec![]);
         for bracket in &passing {
             let (at, entry) = (bracket.at, bracket.entry);
@@ -223,7 +228,7 @@ impl Step<'_> {
                 };
                 (0..self.n).for_each(|i| x[jump.at + i] += self.h * way[i]);
             }
-            self.rates(path, &x)
+            self.rates(path, 1.0, &x)
         });
         let line = |jump: &&Bracket| {
             let straight = Few::from_elem(0.0, self.n);
@@ -232,6 +237,7 @@ impl Step<'_> {
             let ends = ends.each_ref().map(|all| Few::from_slice(&all[at.clone()]));
             let off = ends[1].iter().zip(&ends[0]).map(|(b, a)| b - a).collect();
             let mut line = Bracket::new((jump.at, jump.entry), ways, ends, off);
+            line.time = Some(1.0);
             let seen = &seen.0[jump.entry];
             line.guess(seen.share);
             line.guess(seen.share_on(&line, self));
@@ -240,9 +246,30 @@ impl Step<'_> {
         jumps.iter().map(line).collect()
     }
 
-    fn rates(&self, path: &mut Path<'_, '_>, x: &[f64]) -> Vec<f64> {
+    /// Rates of points at one share of the step's time.
+    fn rates(&self, path: &mut Path<'_, '_>, time: f64, x: &[f64]) -> Vec<f64> {
         let mut rates = vec![0.0; x.len()];
-        path.rates(self.of, 0.5, x, &mut rates);
+        path.rates(self.of, time, x, &mut rates);
+        rates
+    }
+
+    /// Rates of points whose numbers begin at these places, each at its own share of the step's time. Where the first and the last of these times
+    /// make no difference to a point, no other does.
+    fn rates_at(&self, path: &mut Path<'_, '_>, times: &[(usize, f64)], x: &[f64]) -> Vec<f64> {
+        let shares = || times.iter().map(|(_, time)| *time);
+        let (first, last) = (shares().fold(1.0, f64::min), shares().fold(0.0, f64::max));
+        let mut rates = self.rates(path, first, x);
+        if first == last {
+            return rates;
+        }
+        let others = self.rates(path, last, x);
+        for &(at, time) in times {
+            let of_point = at..at + self.n;
+            if rates[of_point.clone()] != others[of_point.clone()] {
+                let own = self.rates(path, time, x);
+                rates[of_point.clone()].copy_from_slice(&own[of_point]);
+            }
+        }
         rates
     }
 
@@ -251,18 +278,19 @@ impl Step<'_> {
         let mut x = self.begin.to_vec();
         // Ends: looks beside guesses are few, and each other one halves what is left.
         loop {
-            let mut shares = vec![];
+            let (mut shares, mut times) = (vec![], vec![]);
             for bracket in brackets.iter_mut().filter(|b| !b.is_found()) {
                 let share = bracket.next();
                 for i in 0..self.n {
                     x[bracket.at + i] = bracket.state(i, share, self);
                 }
                 shares.push(share);
+                times.push((bracket.at, bracket.time.unwrap_or(share)));
             }
             if shares.is_empty() {
                 break;
             }
-            let rates = self.rates(path, &x);
+            let rates = self.rates_at(path, &times, &x);
             let open = brackets.iter_mut().filter(|b| !b.is_found());
             for (bracket, share) in open.zip(shares) {
                 bracket.see(share, &rates[bracket.at..bracket.at + self.n]);

@@ -61,6 +61,8 @@ pub(super) struct SubstepSchedule {
     next: f64,
     /// Largest size of each state of the centre so far.
     sizes: Vec<f64>,
+    /// Other points less the centre where the way begins; none where all are carried.
+    beside: Vec<f64>,
     /// `true` where rates jump in this sample: steps are then of one length, and no high order is of use.
     is_even: bool,
     /// Where rates have jumped in such steps.
@@ -103,6 +105,7 @@ impl SubstepSchedule {
             stretches: vec![],
             next: f64::INFINITY,
             sizes: vec![0.0; states],
+            beside: vec![],
             is_even: false,
             jumps_seen: JumpsSeen::default(),
             explicit: ExplicitPair::default(),
@@ -140,6 +143,7 @@ impl SubstepSchedule {
         if self.of != Some(way) {
             self.of = Some(way);
             let is_followed = x.len() > self.sizes.len();
+            self.beside.clear();
             return self.choose((path, is_followed), x, &None);
         }
         if self.stretches.is_empty() {
@@ -152,15 +156,19 @@ impl SubstepSchedule {
         }
     }
 
-    /// Returns steps chosen for one point, which moves with them, at whose ends its events are; others may follow.
+    /// Returns steps chosen for the first of these points, at whose ends its events are; the others are seen where it is told what kind of step fails.
     pub fn chosen(
         &mut self,
-        (path, is_followed): (&mut Path<'_, '_>, bool),
-        x: &mut [f64],
+        path: &mut Path<'_, '_>,
+        x: &[f64],
         events: &WayEvents<'_>,
     ) -> Vec<Stretch> {
+        let (centre, others) = x.split_at(self.sizes.len());
+        let beside = others.iter().zip(centre.iter().cycle());
+        self.beside.clear();
+        self.beside.extend(beside.map(|(other, x)| other - x));
         self.of = None;
-        self.choose((path, is_followed), x, events);
+        self.choose((path, !others.is_empty()), &mut centre.to_vec(), events);
         self.stretches.clone()
     }
 
@@ -288,7 +296,7 @@ impl SubstepSchedule {
             path.limit_errors(of, trial, errors);
             let size = self.largest((x, trial), errors);
             falls.see(size <= 1.0, self.explicit.reach(), || {
-                self.is_by_time(path, of, (x, trial), errors)
+                self.is_by_time(path, of, x)
             });
             // A single run goes on from jump to jump.
             if falls.kept_in_row == FEW && patience > FEW {

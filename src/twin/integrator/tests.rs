@@ -417,40 +417,49 @@ fn points_that_friction_stops_take_steps_of_one_length() {
     assert!(taken.substeps > 20 * 32, "{taken:?}");
 }
 
-/// Rates `force(t) − decay·x`, followed by several points and by one, are those of short steps.
-fn assert_followed(force: impl Fn(f64) -> f64, decay: f64, dt: f64) {
-    let rates = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
-        for (x, dx) in x.iter().zip(dx) {
-            *dx = force(now.t) - decay * x;
+/// Rates of points of `n` states each, followed by all of them and by the first alone, are those of short steps.
+fn assert_followed(n: usize, dt: f64, points: &[f64], rates: impl Fn(f64, &[f64], &mut [f64])) {
+    let all = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| {
+        for (x, dx) in x.chunks_exact(n).zip(dx.chunks_exact_mut(n)) {
+            rates(now.t, x, dx);
         }
     };
-    for points in [&[0.0, 0.1, -0.1][..], &[0.0]] {
+    for points in [points, &points[..n]] {
         let rule = (Integrator::Adaptive, Stepping::default());
-        let mut work = Workspace::of(&[], &[Interval::EVERYTHING], rule, &[]);
+        let mut work = Workspace::of(&[], &vec![Interval::EVERYTHING; n], rule, &[]);
         let (mut found, mut exact) = (points.to_vec(), points.to_vec());
-        let mut buffers = StepBuffers::of(1);
+        let mut buffers = StepBuffers::of(n);
         for k in 0..7 {
             let t = f64::from(k) * dt;
-            work.carry(1, &Now::new(t, dt, &[], &[]), &mut found, rates);
+            work.carry(n, &Now::new(t, dt, &[], &[]), &mut found, all);
             let short = dt / 20_000.0;
             for i in 0..20_000 {
                 let now = Now::new(t + f64::from(i) * short, short, &[], &[]);
-                Integrator::RungeKutta4.step(&now, &mut exact, &mut buffers, rates);
+                Integrator::RungeKutta4.step(&now, &mut exact, &mut buffers, all);
             }
             for (x, exact) in found.iter().zip(&exact) {
-                assert!((x - exact).abs() < 2e-6, "{points:?}, {k}: {x} {exact}");
+                assert!((x - exact).abs() < 5e-6, "{points:?}, {k}: {x} {exact}");
             }
         }
         let taken = work.steps_taken().unwrap();
-        assert!(taken.substeps < 4000, "{taken:?}");
+        assert!(taken.substeps < 5000, "{taken:?}");
     }
 }
 
-/// Rates that are steep in time alone are no jump that each point meets for itself: all follow them within the tolerance, from a state of zero, too.
+/// Rates that are steep in time alone are no jump that each point meets for itself: all follow them within the tolerance, from a state of zero, with gains
+/// of their own, and where a state integrates what changes, too.
 #[test]
 fn points_follow_what_is_steep_in_time() {
-    assert_followed(|t| (-((t - 9.93) / 0.1225).powi(2)).exp(), 0.0, 2.0);
-    assert_followed(|t| (30.0 * (1.37 * t).sin()).tanh(), 1.0, 1.0);
+    let pulse = |t: f64| (-((t - 9.93) / 0.1225).powi(2)).exp();
+    let wave = |t: f64| (30.0 * (1.37 * t).sin()).tanh();
+    assert_followed(1, 2.0, &[0.0, 0.1, -0.1], |t, _, dx| dx[0] = pulse(t));
+    assert_followed(1, 1.0, &[0.0, 0.1, -0.1], |t, x, dx| dx[0] = wave(t) - x[0]);
+    let mass = [0.0, 0.0, 0.1, 0.0, -0.1, 0.0, 0.0, 0.1, 0.0, -0.1];
+    assert_followed(2, 2.0, &mass, |t, x, dx| (dx[0], dx[1]) = (x[1], pulse(t)));
+    let gains = [0.1, 1.0, 0.1, 0.6, 0.1, 1.4];
+    assert_followed(2, 1.0, &gains, |t, x, dx| {
+        (dx[0], dx[1]) = (x[1] * wave(t) - x[0], 0.0)
+    });
 }
 
 /// Rates that turn round where a state passes a wave are met by each point at its own time, and take steps of one length.

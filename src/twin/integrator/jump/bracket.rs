@@ -82,6 +82,8 @@ pub(super) struct Bracket {
     /// Shares σ between which the jump is, and rates there.
     pub shares: [f64; 2],
     pub rates: [Few; 2],
+    /// Share of the step's time at which all its points are; the share σ itself if `None`.
+    pub time: Option<f64>,
     /// Shares to be looked at before others.
     guesses: Few,
 }
@@ -96,6 +98,7 @@ impl Bracket {
             ends,
             off,
             shares: [0.0, 1.0],
+            time: None,
             guesses: Few::new(),
         }
     }

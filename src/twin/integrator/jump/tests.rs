@@ -230,3 +230,20 @@ fn blocks_that_stick_move_together() {
     let still = carried(Integrator::Adaptive, &[[0.5, -0.3]], 12, held);
     assert!(still.iter().all(|v| v.abs() < 1e-6), "{still:?}");
 }
+
+/// A belt that turns round carries what sticks to it: one point and three are where it is, at the end of each row.
+#[test]
+fn what_a_moving_jump_holds_moves_with_it() {
+    let belt = |t: f64| (0.15 * t).sin();
+    for points in [&[[0.0]][..], &[[0.0], [0.02], [-0.02]]] {
+        for rows in [1, 2, 10, 20, 40] {
+            let x = carried(Integrator::Adaptive, points, rows, |t, x, dx| {
+                dx[0] = -0.2 * sign(x[0] - belt(t)) - 0.005 * x[0];
+            });
+            for x in x {
+                let off = (x - belt(rows as f64)).abs();
+                assert!(off < 1e-8, "{rows} of {points:?}: {off:e}");
+            }
+        }
+    }
+}

@@ -7,6 +7,9 @@ use crate::twin::integrator::path::{Path, Stretch};
 /// Lengths of two steps that tell rates that jump from those that are stiff, over the length that the tolerance allows: both are beyond it, and
 /// not so far that all detail is lost.
 pub(super) const JUMPS: [f64; 2] = [2.0, 16.0];
+/// Least share of the largest error of a state at rest that each point has where time changes: gains of points may differ so much. Errors of points
+/// that do not meet a jump are far below, those of points that do are alike.
+const LEAST: f64 = 0.125;
 /// Least number of steps of one length in a sample where rates jump again and again, as dry friction does: jumps are met within a step, all else has
 /// its second order. Twice as many change the evidence of a sled with friction by 0.03 nats, and take twice the time.
 const EVEN: usize = 4;
@@ -50,25 +53,24 @@ impl Falls {
 }
 
 impl SubstepSchedule {
-    /// Returns whether half of the worst of a step's errors, or more, is there for each point while the states stand, too. Where each point meets a
-    /// jump at its own time, some points have no error there once the step is short.
-    pub(super) fn is_by_time(
-        &mut self,
-        path: &mut Path<'_, '_>,
-        of: Stretch,
-        (x, to): (&[f64], &[f64]),
-        errors: &[f64],
-    ) -> bool {
-        let shares = self.shares((x, to), errors).enumerate();
-        let Some((worst, _)) = shares.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+    /// Returns whether a step from `x` fails by what changes with time: while the states stand, one of them still has an error beyond the tolerance,
+    /// and each point has half of its own or more. Where each point meets a jump at its own time, some points have no error there once the step is
+    /// short.
+    pub(super) fn is_by_time(&mut self, path: &mut Path<'_, '_>, of: Stretch, x: &[f64]) -> bool {
+        let x = self.with_followers(path, x);
+        let (mut to, mut errors, mut at_rest) = (x.clone(), x.clone(), x.clone());
+        self.step(path, of, &mut to, Some(&mut errors));
+        path.limit_errors(of, &to, &mut errors);
+        self.explicit.errors_at_rest(path, of, &x, &mut at_rest);
+        path.limit_errors(of, &to, &mut at_rest);
+        let shares = self.shares((&x, &to), &at_rest).enumerate();
+        let worst = shares.max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((worst, _)) = worst.filter(|(_, share)| *share > 1.0) else {
             return false;
         };
-        let (n, half) = (self.sizes.len(), 0.5 * errors[worst].abs());
-        let mut at_rest = vec![0.0; x.len()];
-        self.explicit.errors_at_rest(path, of, x, &mut at_rest);
-        path.limit_errors(of, to, &mut at_rest);
-        let mut of_points = at_rest.iter().skip(worst % n).step_by(n);
-        of_points.all(|error| error.abs() >= half)
+        let (n, least) = (self.sizes.len(), LEAST * at_rest[worst].abs());
+        let mut of_points = (at_rest.iter().zip(&errors)).skip(worst % n).step_by(n);
+        of_points.all(|(at_rest, error)| at_rest.abs() >= least.max(0.5 * error.abs()))
     }
 
     /// Returns whether rates jump in steps of these lengths, beyond the tolerance: errors then grow in proportion to the length. Those of smooth rates
@@ -81,27 +83,26 @@ impl SubstepSchedule {
         from: f64,
         lengths: [f64; 2],
     ) -> bool {
+        let x = self.with_followers(path, x);
         // A jump that is told is none.
         let end = path.next_break(from) - from;
         let lengths = lengths.map(|length| length.min(end));
-        let steps = lengths.map(|length| {
-            let (mut trial, mut errors) = (x.to_vec(), vec![0.0; x.len()]);
-            let of = Stretch { from, length };
-            self.explicit.step(path, of, &mut trial, Some(&mut errors));
-            path.limit_errors(of, &trial, &mut errors);
-            (of, trial, errors)
+        let ways = lengths.map(|length| Stretch { from, length });
+        let errors = ways.map(|of| {
+            let (mut to, mut errors) = (x.clone(), x.clone());
+            self.explicit.step(path, of, &mut to, Some(&mut errors));
+            path.limit_errors(of, &to, &mut errors);
+            self.largest((&x, &to), &errors)
         });
-        let errors = (steps.each_ref()).map(|(_, trial, errors)| self.largest((x, trial), errors));
         let order = (errors[1] / errors[0]).ln() / (lengths[1] / lengths[0]).ln();
         errors[0] > 1.0
             && errors[1].is_finite()
             && order < 2.0
-            && !(steps.iter())
-                .any(|(of, trial, errors)| self.is_by_time(path, *of, (x, trial), errors))
+            && !ways.into_iter().any(|of| self.is_by_time(path, of, &x))
     }
 
-    /// Least number of steps of one length: more where states have limits, which act at their ends, where rates change with time, since jumps are looked for
-    /// at one time of a step, and where rates are stiff. With a quarter of these a level that turns at its limit ends half a hundredth of its range off.
+    /// Least number of steps of one length: more where states have limits, which act at their ends, where rates change with time,
+    /// and where rates are stiff. With a quarter of these a level that turns at its limit ends half a hundredth of its range off.
     /// Explicit steps are as short as the fastest state asks for.
     pub(super) fn even(&self, path: &mut Path<'_, '_>, x: &[f64]) -> usize {
         let way = Stretch {
@@ -115,10 +116,7 @@ impl SubstepSchedule {
             rates
         };
         let first = at(0.0, x);
-        let is_still = first == at(1.0, x);
-        if has_limits || self.is_implicit || !is_still {
-            return 8 * EVEN;
-        }
+        let mut is_still = first == at(1.0, x);
         let n = self.sizes.len();
         let mut fastest = vec![0.0; x.len()];
         for j in 0..n {
@@ -126,9 +124,12 @@ impl SubstepSchedule {
                 let mut x = x.to_vec();
                 let states = x.iter_mut().skip(j).step_by(n);
                 states.for_each(|x| *x += shares * 1e-6 * self.sizes[j]);
-                at(0.0, &x)
+                (at(0.0, &x), at(1.0, &x))
             };
-            let (near, next) = (beside(1.0), beside(2.0));
+            // A jump that moves leaves a point on one of its sides as it was.
+            let [before, near, next] = [-1.0, 1.0, 2.0].map(&mut beside);
+            is_still &= before.0 == before.1 && near.0 == near.1;
+            let (near, next) = (near.0, next.0);
             for (i, fastest) in fastest.iter_mut().enumerate() {
                 // A jump is in one change of both.
                 let change = (near[i] - first[i]).abs().min((next[i] - near[i]).abs());
@@ -136,15 +137,28 @@ impl SubstepSchedule {
                 *fastest += if rate.is_finite() { rate } else { 0.0 };
             }
         }
+        if has_limits || self.is_implicit || !is_still {
+            return 8 * EVEN;
+        }
         let fastest = fastest.into_iter().fold(0.0, f64::max);
         ((2.0 * fastest * seconds).ceil() as usize).clamp(EVEN, 8 * EVEN)
     }
 
-    /// Errors of a step over the tolerance of their states.
+    /// Returns all points, where the centre alone is carried and now at `x`: each is taken to be as far from it as where the way begins.
+    fn with_followers(&self, path: &Path<'_, '_>, x: &[f64]) -> Vec<f64> {
+        let mut all = x.to_vec();
+        for beside in self.beside.chunks_exact(x.len()) {
+            all.extend(x.iter().zip(beside).map(|(x, beside)| x + beside));
+        }
+        path.limit(&mut all);
+        all
+    }
+
+    /// Errors of a step over the tolerance of their states; there are none below the least number of full precision.
     fn shares(&self, (from, to): (&[f64], &[f64]), errors: &[f64]) -> impl Iterator<Item = f64> {
         let n = self.sizes.len();
         (errors.iter().zip(from).zip(to).enumerate()).map(move |(k, ((error, from), to))| {
-            if *error == 0.0 {
+            if error.abs() < f64::MIN_POSITIVE {
                 return 0.0;
             }
             let size = self.sizes[k % n].max(from.abs()).max(to.abs());
