@@ -146,6 +146,10 @@ impl Rosenbrock {
                 let size = x[i].abs().max(sizes[i % n]);
                 h * (near[i] - first[i]).abs() > HALF_DIGITS * size
             });
+            let is_held = match is_steep {
+                true => held(path, of, j, (sizes.len(), x, stage), (first, near)),
+                false => vec![],
+            };
             if is_steep {
                 for at in (0..x.len()).step_by(n) {
                     stage[at + j] += stage[at + j] - x[at + j];
@@ -157,9 +161,7 @@ impl Rosenbrock {
                 let steps = if is_steep { 2.0 } else { 1.0 };
                 let difference = (stage[at + j] - x[at + j]) / steps;
                 stage[at + j] = x[at + j];
-                // A state that is pushed back behind a jump is held by it.
-                let is_held = near[at + j] * difference < 0.0;
-                let (from, to) = match is_steep && !is_held {
+                let (from, to) = match is_steep && !is_held[p] {
                     true => (&near[..], &far[..]),
                     false => (&first[..], &near[..]),
                 };
@@ -176,6 +178,29 @@ impl Rosenbrock {
         });
         decomposed.collect()
     }
+}
+
+/// Returns which points a jump of the rate of their state j holds: rates at points `near`, beside those at `x` to the side that they move to, push back, and
+/// do until the step's end, as those at `x` push on. A jump that moves carries what it holds with it.
+fn held(
+    path: &mut Path<'_, '_>,
+    of: Stretch,
+    j: usize,
+    (n, x, near): (usize, &[f64], &[f64]),
+    (first, pushed): (&[f64], &[f64]),
+) -> Vec<bool> {
+    let is_back = |at: usize| pushed[at] * (near[at] - x[at]) < 0.0;
+    let mut is_held: Vec<bool> = (j..x.len()).step_by(n).map(is_back).collect();
+    if is_held.contains(&true) {
+        for (points, before) in [(x, first), (near, pushed)] {
+            let mut behind = vec![0.0; x.len()];
+            path.rates(of, 1.0, points, &mut behind);
+            for (is_held, at) in is_held.iter_mut().zip((j..x.len()).step_by(n)) {
+                *is_held &= behind[at] * before[at] >= 0.0;
+            }
+        }
+    }
+    is_held
 }
 
 /// Adds weighted increments, all times a factor.

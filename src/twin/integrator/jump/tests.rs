@@ -236,13 +236,15 @@ fn blocks_that_stick_move_together() {
 fn what_a_moving_jump_holds_moves_with_it() {
     let belt = |t: f64| (0.15 * t).sin();
     for points in [&[[0.0]][..], &[[0.0], [0.02], [-0.02]]] {
-        for rows in [1, 2, 10, 20, 40] {
-            let x = carried(Integrator::Adaptive, points, rows, |t, x, dx| {
-                dx[0] = -0.2 * sign(x[0] - belt(t)) - 0.005 * x[0];
-            });
-            for x in x {
-                let off = (x - belt(rows as f64)).abs();
-                assert!(off < 1e-8, "{rows} of {points:?}: {off:e}");
+        for rule in [Integrator::Adaptive, Integrator::Stiff] {
+            for rows in [1, 2, 10, 20, 40] {
+                let x = carried(rule, points, rows, |t, x, dx| {
+                    dx[0] = -0.2 * sign(x[0] - belt(t)) - 0.005 * x[0];
+                });
+                for x in x {
+                    let off = (x - belt(rows as f64)).abs();
+                    assert!(off < 1e-8, "{rule:?}, {rows} of {points:?}: {off:e}");
+                }
             }
         }
     }
