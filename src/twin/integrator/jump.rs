@@ -204,6 +204,10 @@ impl Step<'_> {
         let mut lines = self.lines(path, seen, &jumps);
         self.find(path, &mut lines);
         for (line, jump) in lines.iter().zip(jumps) {
+            if let Some(rate) = line.outrun(jump) {
+                means.push((line.at + line.entry, rate));
+                continue;
+            }
             // What jumps at the begin as well, but is held by another share, has its own bracket.
             let held = (0..self.n).filter(|&i| jump.jumps(i) && line.jumps(i));
             means.extend(held.map(|i| (line.at + i, line.way(line.share(), i))));
@@ -218,24 +222,34 @@ impl Step<'_> {
         if jumps.is_empty() {
             return vec![];
         }
-        let ends = [0, 1].map(|end: usize| {
+        // At both ends and near them, where slopes show.
+        let looks = [0.0, NEAR, 1.0 - NEAR, 1.0].map(|share| {
             let mut x = self.begin.to_vec();
             for jump in jumps {
-                let way = if end == 0 {
-                    &jump.ends[0]
-                } else {
-                    &jump.rates[1]
-                };
-                (0..self.n).for_each(|i| x[jump.at + i] += self.h * way[i]);
+                let of_point = &mut x[jump.at..jump.at + self.n];
+                for (i, x) in of_point.iter_mut().enumerate() {
+                    let [before, behind] = jump.sides(i);
+                    *x += self.h * ((1.0 - share) * before + share * behind);
+                }
             }
             self.rates(path, 1.0, &x)
         });
         let line = |jump: &&Bracket| {
             let straight = Few::from_elem(0.0, self.n);
-            let ways = [jump.ends[0].clone(), jump.rates[1].clone(), straight];
+            let sides = [0, 1].map(|end: usize| (0..self.n).map(|i| jump.sides(i)[end]).collect());
+            let [before, behind] = sides;
+            let ways = [before, behind, straight];
             let at = jump.at..jump.at + self.n;
-            let ends = ends.each_ref().map(|all| Few::from_slice(&all[at.clone()]));
-            let off = ends[1].iter().zip(&ends[0]).map(|(b, a)| b - a).collect();
+            let looks = looks
+                .each_ref()
+                .map(|all| Few::from_slice(&all[at.clone()]));
+            let off = (0..self.n).map(|i| {
+                let [first, near, far, last] = looks.each_ref().map(|of_point| of_point[i]);
+                let (one, other) = ((near - first) / NEAR, (last - far) / NEAR);
+                last - first - if other.abs() < one.abs() { other } else { one }
+            });
+            let (off, [first, _, _, last]) = (off.collect(), looks.clone());
+            let ends = [first, last];
             let mut line = Bracket::new((jump.at, jump.entry), ways, ends, off);
             line.time = Some(1.0);
             let seen = &seen.0[jump.entry];
@@ -254,7 +268,7 @@ impl Step<'_> {
     }
 
     /// Rates of points whose numbers begin at these places, each at its own share of the step's time. Where the first and the last of these times
-    /// make no difference to a point, no other does.
+    /// make no difference to a point, none between is taken to.
     fn rates_at(&self, path: &mut Path<'_, '_>, times: &[(usize, f64)], x: &[f64]) -> Vec<f64> {
         let shares = || times.iter().map(|(_, time)| *time);
         let (first, last) = (shares().fold(1.0, f64::min), shares().fold(0.0, f64::max));

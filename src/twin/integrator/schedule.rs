@@ -316,6 +316,12 @@ impl SubstepSchedule {
                 self.give_up(path, x);
                 return SampleSteps::Done;
             }
+            // No shorter step has numbers either.
+            if size.is_infinite() && longest <= SHORTEST {
+                self.stretches.clear();
+                x.fill(f64::NAN);
+                return SampleSteps::Done;
+            }
             if size <= 1.0 || longest <= shortest {
                 let reached = if parts == 1.0 { end } else { from + of.length };
                 from = self.keep(path, &mut events, (of, reached), (x, trial));

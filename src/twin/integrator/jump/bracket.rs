@@ -152,6 +152,30 @@ impl Bracket {
         self.is_found() && self.change(i).abs() > least
     }
 
+    /// Ways of a state over the whole step on either side of the jump: before it the straight one, or the bent one where that goes farther.
+    pub fn sides(&self, i: usize) -> [f64; 2] {
+        let of = |i: usize| {
+            let [straight, behind] = [self.ends[0][i], self.rates[1][i]];
+            (straight, self.ways[1][i] + 0.5 * self.ways[2][i], behind)
+        };
+        let (straight, bent, behind) = of(self.entry);
+        let is_bent = (bent - behind).abs() > (straight - behind).abs();
+        let (straight, bent, behind) = of(i);
+        [if is_bent { bent } else { straight }, behind]
+    }
+
+    /// The rate of a point that a jump would hold, but for its moving on faster than the rates on either side: all the line is on one side of it then.
+    pub fn outrun(&self, jump: &Bracket) -> Option<f64> {
+        let (i, change) = (self.entry, jump.change(self.entry).abs());
+        if !jump.jumps(i) || self.jumps(i) || self.off[i].abs() >= 0.25 * change {
+            return None;
+        }
+        let end = self.ends[1][i];
+        let [one, other] = [jump.ends[0][i], jump.rates[1][i]];
+        let is_one = (one - end).abs() < (other - end).abs();
+        Some(0.5 * (end + if is_one { one } else { other }))
+    }
+
     /// Mean rate on the way to the jump and on from it, to where rates are these.
     pub fn passed(&self, i: usize, end: f64) -> f64 {
         let (before, behind) = (self.rates[0][i], self.rates[1][i]);

@@ -249,3 +249,73 @@ fn what_a_moving_jump_holds_moves_with_it() {
         }
     }
 }
+
+/// Where a belt moves on faster than friction follows, what it held falls behind at once: half a step of the wrong side's rate is an error of 0.03.
+#[test]
+fn a_belt_outruns_what_it_held() {
+    let rates = |t: f64, x: &[f64], dx: &mut [f64]| {
+        dx[0] = -0.5 * sign(x[0] - 0.3 * (2.0 * (t + 2.84375)).sin());
+    };
+    let [end] = stepped(1.0 / 32.0, [-0.16832284725], rates);
+    assert!((end + 0.15271).abs() < 1e-3, "{end}");
+}
+
+/// Blocks on a spring that meet a belt late in a step of 0.125 s: where they end has no leaps.
+#[test]
+fn a_jump_at_the_end_of_a_step_is_met() {
+    let mut last = None;
+    for k in 0..=700 {
+        let begin = [-0.1, 0.35 * f64::from(k) / 700.0];
+        let [_, end] = stepped(0.125, begin, |t, x, dx| {
+            let belt = 0.3 * (1.5 * (t + 0.5)).sin();
+            (dx[0], dx[1]) = (x[1], -4.0 * x[0] - 0.8 * sign(x[1] - belt) - 0.1 * x[1]);
+        });
+        let leap = last.map_or(0.0, |last: f64| (end - last).abs());
+        assert!(leap < 1e-3, "{begin:?}: {leap}");
+        last = Some(end);
+    }
+}
+
+/// A block with friction in thick oil, pushed to and fro, has fast rates from its first row on; a relay has a threshold that moves away and comes back
+/// within a row. Both end where short steps do.
+#[test]
+fn first_rows_have_steps_that_are_short_enough() {
+    type Rates = fn(f64, &[f64], &mut [f64]);
+    let systems: [(&str, [f64; 2], f64, Rates); 3] = [
+        ("oil", [0.0, 0.1], 1e-3, |t, x, dx| {
+            let push = 3.0 * (5.0 * t).sin() - 2.0 * sign(x[1]);
+            (dx[0], dx[1]) = (x[1], push - 100.0 * x[1]);
+        }),
+        ("thick oil", [0.0, 0.1], 1e-3, |t, x, dx| {
+            let push = 9.0 * (5.0 * t).sin() - 6.0 * sign(x[1]);
+            (dx[0], dx[1]) = (x[1], push - 300.0 * x[1]);
+        }),
+        ("relay", [0.1, 0.0], 2e-3, |t, x, dx| {
+            let is_below = x[0] < 0.5 * (3.0 * t).sin();
+            (dx[0], dx[1]) = (f64::from(u8::from(is_below)) - x[0], 0.0);
+        }),
+    ];
+    for (name, begin, most, rates) in systems {
+        let others = [begin, begin.map(|x| 1.1 * x), begin.map(|x| 0.9 * x)];
+        for points in [&others[..1], &others] {
+            for rows in 1..=3 {
+                let ends = carried(Integrator::Adaptive, points, rows, rates);
+                for (end, begin) in ends.chunks_exact(2).zip(points) {
+                    let (mut exact, short) = (*begin, 1.0 / 20_000.0);
+                    for i in 0..20_000 * rows {
+                        let mut dx = [0.0; 2];
+                        rates(i as f64 * short, &exact, &mut dx);
+                        (0..2).for_each(|i| exact[i] += short * dx[i]);
+                    }
+                    for (end, exact) in end.iter().zip(exact) {
+                        let off = (end - exact).abs();
+                        assert!(
+                            off < most,
+                            "{name}, row {rows} of {points:?}: {end} {exact}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
