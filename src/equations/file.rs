@@ -19,7 +19,6 @@ use crate::twin::{
     Hold, Integrator, Interval, MOST_SUBSTEPS, Outline, Parameter, Stepping, TOLERANCES,
 };
 use std::collections::BTreeMap;
-use std::ops::RangeInclusive;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -472,17 +471,36 @@ fn integrator(
         (Some(other), false) => other,
         (None, false) => Integrator::Adaptive,
     };
-    // What a study says of substeps and the tolerance, the study checks.
-    let given = |key, range: RangeInclusive<f64>| {
-        let value = record.and_then(|record| number(record.get(key)?.get_ref()));
-        value.filter(|value| range.contains(value))
+    Ok((integrator, stepping(record, &source)?))
+}
+
+/// Substeps and tolerance of the table `record`.
+fn stepping(
+    record: Option<&DeTable<'_>>,
+    source: &SourceText<'_>,
+) -> Result<Stepping, EquationsError> {
+    let given = |key| {
+        let value = record.and_then(|record| record.get(key))?;
+        Some((
+            value.span().start,
+            number(value.get_ref()).unwrap_or(f64::NAN),
+        ))
     };
     let mut stepping = Stepping::default();
-    if let Some(substeps) = given("substeps", 1.0..=MOST_SUBSTEPS as f64) {
+    if let Some((byte, substeps)) = given("substeps") {
+        if substeps.fract() != 0.0 || !(1.0..=MOST_SUBSTEPS as f64).contains(&substeps) {
+            let problem = format!("substeps: choose a whole number between 1 and {MOST_SUBSTEPS}");
+            return source.error(byte, problem);
+        }
         stepping.substeps = substeps as usize;
     }
-    if let Some(tolerance) = given("tolerance", TOLERANCES) {
+    if let Some((byte, tolerance)) = given("tolerance") {
+        if !TOLERANCES.contains(&tolerance) {
+            let (least, most) = (TOLERANCES.start(), TOLERANCES.end());
+            let problem = format!("tolerance: choose a share between {least:e} and {most}");
+            return source.error(byte, problem);
+        }
         stepping.tolerance = tolerance;
     }
-    Ok((integrator, stepping))
+    Ok(stepping)
 }

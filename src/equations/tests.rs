@@ -292,6 +292,30 @@ fn next_is_the_value_at_the_next_sample() {
     );
 }
 
+/// Substeps and tolerances out of range are told with their place, in a text without a study around it as well.
+#[test]
+fn steps_of_a_record_have_a_range() {
+    let text = "[states]\nx = { rate = \"-x\" }\n[outputs]\ny = { value = \"x\" }\n[record]\n";
+    for (line, expected) in [
+        (
+            "substeps = 2000",
+            "line 6, column 12: substeps: choose a whole number between 1 and 1000",
+        ),
+        ("substeps = 2.5", "choose a whole number"),
+        ("substeps = 'two'", "choose a whole number"),
+        (
+            "tolerance = 0.5",
+            "tolerance: choose a share between 1e-12 and 0.1",
+        ),
+        ("tolerance = nan", "choose a share"),
+    ] {
+        let told = problem(&format!("{text}{line}\n"));
+        assert!(told.contains(expected), "{line}: {told}");
+    }
+    let twin = Equations::parse(&format!("{text}substeps = 1000\ntolerance = 1e-5\n")).unwrap();
+    assert_eq!(twin.program.stepping().substeps, 1000);
+}
+
 /// Over 1000 values of each parameter, as near as those of a difference and as far as those of a search, the log-likelihood is smooth: steps
 /// that are chosen anew leave no jump of a millionth of it.
 #[test]

@@ -420,7 +420,7 @@ fn likelihoods_across_events_are_smooth() {
 }
 
 /// Belts that turn round meet each point at its own time, hold it for long or let it pass: the likelihood is that of 500 steps a row, and nearly so where
-/// the twin has an event as well. It was 117 nats off.
+/// the twin has an event as well. With jumps in the middle of steps it was 3 to 71 nats off.
 #[test]
 fn points_meet_their_own_jumps_beside_an_event() {
     for (rate, dt) in [

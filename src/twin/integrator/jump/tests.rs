@@ -319,3 +319,20 @@ fn first_rows_have_steps_that_are_short_enough() {
         }
     }
 }
+
+/// A tank whose pump empties it beyond its bottom, where an outflow has no number: the run ends there, and takes no 100 000 steps before it does.
+#[test]
+fn rates_without_numbers_end_a_run() {
+    let calls = std::cell::Cell::new(0);
+    let x = carried(
+        Integrator::Adaptive,
+        &[[0.2], [0.21], [0.19]],
+        2,
+        |_, x, dx| {
+            calls.set(calls.get() + 1);
+            dx[0] = -x[0].sqrt() - 0.1;
+        },
+    );
+    assert!(x.iter().all(|x| x.is_nan()), "{x:?}");
+    assert!(calls.get() < 20_000, "{calls:?}");
+}
