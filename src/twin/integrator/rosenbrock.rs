@@ -146,15 +146,14 @@ impl Rosenbrock {
                 let size = x[i].abs().max(sizes[i % n]);
                 h * (near[i] - first[i]).abs() > HALF_DIGITS * size
             });
-            let is_held = match is_steep {
-                true => held(path, of, j, (sizes.len(), x, stage), (first, near)),
-                false => vec![],
-            };
+            let mut is_held = vec![];
             if is_steep {
+                let beside = stage.clone();
                 for at in (0..x.len()).step_by(n) {
                     stage[at + j] += stage[at + j] - x[at + j];
                 }
                 path.rates(of, 0.0, stage, far);
+                is_held = held(path, of, (n, j), [x, &beside], [first, near, far]);
             }
             for (p, matrix) in matrices.iter_mut().enumerate() {
                 let at = p * n;
@@ -180,23 +179,26 @@ impl Rosenbrock {
     }
 }
 
-/// Returns which points a jump of the rate of their state j holds: rates at points `near`, beside those at `x` to the side that they move to, push back, and
-/// do until the step's end, as those at `x` push on. A jump that moves carries what it holds with it.
+/// Returns which points are held by their state j, of n: its rate at points `beside` pushes back. A jump holds it if it does so until the step's end, as
+/// one that moves carries what it holds. `rates` are those at `x`, there, and as far behind.
 fn held(
     path: &mut Path<'_, '_>,
     of: Stretch,
-    j: usize,
-    (n, x, near): (usize, &[f64], &[f64]),
-    (first, pushed): (&[f64], &[f64]),
+    (n, j): (usize, usize),
+    [x, beside]: [&[f64]; 2],
+    [first, near, far]: [&[f64]; 3],
 ) -> Vec<bool> {
-    let is_back = |at: usize| pushed[at] * (near[at] - x[at]) < 0.0;
-    let mut is_held: Vec<bool> = (j..x.len()).step_by(n).map(is_back).collect();
-    if is_held.contains(&true) {
-        for (points, before) in [(x, first), (near, pushed)] {
-            let mut behind = vec![0.0; x.len()];
-            path.rates(of, 1.0, points, &mut behind);
-            for (is_held, at) in is_held.iter_mut().zip((j..x.len()).step_by(n)) {
-                *is_held &= behind[at] * before[at] >= 0.0;
+    let states = || (j..x.len()).step_by(n);
+    let mut is_held: Vec<bool> = states()
+        .map(|at| near[at] * (beside[at] - x[at]) < 0.0)
+        .collect();
+    let is_jump = |at: usize| (far[at] - near[at]).abs() < 0.5 * (near[at] - first[at]).abs();
+    if (states().zip(&is_held)).any(|(at, is_held)| *is_held && is_jump(at)) {
+        let mut late = vec![0.0; x.len()];
+        for (points, before) in [(x, first), (beside, near)] {
+            path.rates(of, 1.0, points, &mut late);
+            for (at, is_held) in states().zip(&mut is_held) {
+                *is_held &= !is_jump(at) || late[at] * before[at] >= 0.0;
             }
         }
     }

@@ -154,24 +154,27 @@ impl SubstepSchedule {
             true => EVEN,
             false => (2.0 * fastest * seconds).ceil() as usize,
         };
-        match has_limits || self.is_implicit || !is_still {
-            true => stable.clamp(8 * EVEN, MOST_SUBSTEPS),
-            false => stable.clamp(EVEN, MOST_SUBSTEPS),
-        }
+        let least = match has_limits || self.is_implicit || !is_still {
+            true => 8 * EVEN,
+            false => EVEN,
+        };
+        stable.clamp(least, MOST_SUBSTEPS)
     }
 
-    /// Sizes of the states, in the first sample those that the points and their rates show.
+    /// Sizes of the states, in the first sample those that the points and their rates show; what is zero has one that keeps its digits.
     fn sizes_ahead(&self, x: &[f64], rates: &[f64], seconds: f64) -> Vec<f64> {
         let mut sizes = self.sizes.clone();
         for (x, rates) in x.chunks(sizes.len()).zip(rates.chunks(sizes.len())) {
             for ((size, x), rate) in sizes.iter_mut().zip(x).zip(rates) {
-                *size = size.max(x.abs()).max((seconds * rate).abs());
+                let ahead = x.abs().max((seconds * rate).abs());
+                *size = size.max(ahead).max(f64::MIN_POSITIVE.sqrt());
             }
         }
         sizes
     }
 
-    /// Returns all points, where the centre alone is carried and now at `x`: each is taken to be as far from it as where the way begins.
+    /// Returns all points, where the centre alone is carried and now at `x`: each is taken to be as far from it as where the way begins. Where `x` are
+    /// all of them, they are within their limits.
     fn with_followers(&self, path: &Path<'_, '_>, x: &[f64]) -> Vec<f64> {
         let mut all = x.to_vec();
         for beside in self.beside.chunks_exact(x.len()) {
