@@ -280,11 +280,11 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 164, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 66_700, lines),
+        Ratchet::new("lines of code", 66_860, lines),
         Ratchet::new("files", 514, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 15, methods_of_state_space(sources)),
-        Ratchet::new("named numeric constants", 271, constants(sources)),
+        Ratchet::new("named numeric constants", 273, constants(sources)),
         Ratchet::new(
             "functions of 6 or more parameters",
             3,
