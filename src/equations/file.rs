@@ -19,6 +19,7 @@ use crate::twin::{
     Hold, Integrator, Interval, MOST_SUBSTEPS, Outline, Parameter, Stepping, TOLERANCES,
 };
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -481,24 +482,25 @@ fn stepping(
 ) -> Result<Stepping, EquationsError> {
     let given = |key| {
         let value = record.and_then(|record| record.get(key))?;
-        Some((
-            value.span().start,
-            number(value.get_ref()).unwrap_or(f64::NAN),
-        ))
+        Some((value.span(), number(value.get_ref()).unwrap_or(f64::NAN)))
+    };
+    let refused = |key, at: Range<usize>, remedy: String| {
+        let written = excerpt(&source.0[at.clone()]);
+        source.error(at.start, format!("{key} = {written}; {remedy}"))
     };
     let mut stepping = Stepping::default();
-    if let Some((byte, substeps)) = given("substeps") {
+    if let Some((at, substeps)) = given("substeps") {
         if substeps.fract() != 0.0 || !(1.0..=MOST_SUBSTEPS as f64).contains(&substeps) {
-            let problem = format!("substeps: choose a whole number between 1 and {MOST_SUBSTEPS}");
-            return source.error(byte, problem);
+            let remedy = format!("choose a whole number between 1 and {MOST_SUBSTEPS}");
+            return refused("substeps", at, remedy);
         }
         stepping.substeps = substeps as usize;
     }
-    if let Some((byte, tolerance)) = given("tolerance") {
+    if let Some((at, tolerance)) = given("tolerance") {
         if !TOLERANCES.contains(&tolerance) {
             let (least, most) = (TOLERANCES.start(), TOLERANCES.end());
-            let problem = format!("tolerance: choose a share between {least:e} and {most}");
-            return source.error(byte, problem);
+            let remedy = format!("choose a share between {least:e} and {most}");
+            return refused("tolerance", at, remedy);
         }
         stepping.tolerance = tolerance;
     }

@@ -299,13 +299,13 @@ fn steps_of_a_record_have_a_range() {
     for (line, expected) in [
         (
             "substeps = 2000",
-            "line 6, column 12: substeps: choose a whole number between 1 and 1000",
+            "line 6, column 12: substeps = 2000; choose a whole number between 1 and 1000",
         ),
         ("substeps = 2.5", "choose a whole number"),
-        ("substeps = 'two'", "choose a whole number"),
+        ("substeps = 'two'", "'two'; choose a whole number"),
         (
             "tolerance = 0.5",
-            "tolerance: choose a share between 1e-12 and 0.1",
+            "tolerance = 0.5; choose a share between 1e-12 and 0.1",
         ),
         ("tolerance = nan", "choose a share"),
     ] {

@@ -440,7 +440,7 @@ mod tests {
             (
                 "\"euler\"",
                 "\"euler\", \"substeps\": 0",
-                "record: substeps: substeps = 0; choose between",
+                "record: substeps: substeps = 0; choose a whole number between",
             ),
             ("\"rad\"", "\"\\u001b[2J\"", "outputs: the unit"),
             (
