@@ -184,10 +184,10 @@ impl Step<'_> {
                 ends[bracket.at + i] += self.h * bracket.passed(i, behind);
             }
         }
-        let times: Vec<_> = (passing.iter())
-            .map(|b| (b.at, (b.shares[1] + NEAR).min(1.0)))
+        let looks: Vec<_> = (passing.iter())
+            .map(|b| (*b, (b.shares[1] + NEAR).min(1.0)))
             .collect();
-        let onwards = self.rates_at(path, &times, &onwards);
+        let onwards = self.rates_at(path, &looks, &onwards);
         let ends = self.rates(path, 1.0, &ends);
         let (mut means, mut jumps) = (vec![], vec![]);
         for bracket in &passing {
@@ -267,19 +267,29 @@ impl Step<'_> {
         rates
     }
 
-    /// Rates of points whose numbers begin at these places, each at its own share of the step's time. Where the first and the last of these times
-    /// make no difference to a point, none between is taken to.
-    fn rates_at(&self, path: &mut Path<'_, '_>, times: &[(usize, f64)], x: &[f64]) -> Vec<f64> {
-        let shares = || times.iter().map(|(_, time)| *time);
+    /// Rates of the points of brackets, each at its own share of the step's time: on the line between those at the first and the last of these times, where
+    /// a point meets no jump between them.
+    fn rates_at(&self, path: &mut Path<'_, '_>, looks: &[(&Bracket, f64)], x: &[f64]) -> Vec<f64> {
+        let shares = || looks.iter().map(|(_, time)| *time);
         let (first, last) = (shares().fold(1.0, f64::min), shares().fold(0.0, f64::max));
         let mut rates = self.rates(path, first, x);
         if first == last {
             return rates;
         }
         let others = self.rates(path, last, x);
-        for &(at, time) in times {
-            let of_point = at..at + self.n;
-            if rates[of_point.clone()] != others[of_point.clone()] {
+        for &(bracket, time) in looks {
+            let of_point = bracket.at..bracket.at + self.n;
+            let share = (time - first) / (last - first);
+            let points = rates[of_point.clone()]
+                .iter_mut()
+                .zip(&others[of_point.clone()]);
+            let mut is_smooth = true;
+            for ((rate, other), off) in points.zip(&bracket.off) {
+                let change = other - *rate;
+                is_smooth &= change == 0.0 || change.abs() < 0.25 * off.abs();
+                *rate += share * change;
+            }
+            if !is_smooth {
                 let own = self.rates(path, time, x);
                 rates[of_point.clone()].copy_from_slice(&own[of_point]);
             }
@@ -292,19 +302,22 @@ impl Step<'_> {
         let mut x = self.begin.to_vec();
         // Ends: looks beside guesses are few, and each other one halves what is left.
         loop {
-            let (mut shares, mut times) = (vec![], vec![]);
+            let mut shares = vec![];
             for bracket in brackets.iter_mut().filter(|b| !b.is_found()) {
                 let share = bracket.next();
                 for i in 0..self.n {
                     x[bracket.at + i] = bracket.state(i, share, self);
                 }
                 shares.push(share);
-                times.push((bracket.at, bracket.time.unwrap_or(share)));
             }
             if shares.is_empty() {
                 break;
             }
-            let rates = self.rates_at(path, &times, &x);
+            let open = brackets.iter().filter(|b| !b.is_found()).zip(&shares);
+            let looks: Vec<_> = open
+                .map(|(b, share)| (b, b.time.unwrap_or(*share)))
+                .collect();
+            let rates = self.rates_at(path, &looks, &x);
             let open = brackets.iter_mut().filter(|b| !b.is_found());
             for (bracket, share) in open.zip(shares) {
                 bracket.see(share, &rates[bracket.at..bracket.at + self.n]);
