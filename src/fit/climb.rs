@@ -82,7 +82,7 @@ pub(crate) fn climb(
     start: &[f64],
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
-    match ended(problem, start, iterations, true)? {
+    match ended(problem, start, iterations, None)? {
         Some(end) => end.fitted(problem),
         None => Ok(None),
     }
@@ -94,14 +94,15 @@ pub(crate) fn reach(
     start: &[f64],
     iterations: usize,
 ) -> Result<Option<Reached>, FilterError> {
-    ended(problem, start, iterations, false)
+    ended(problem, start, iterations, Some(f64::NEG_INFINITY))
 }
 
+/// As [`climb`], with derivatives at the end, or for those who ask for the place alone, if it has more than this objective.
 fn ended(
     problem: &Problem,
     start: &[f64],
     iterations: usize,
-    models_end: bool,
+    least: Option<f64>,
 ) -> Result<Option<Reached>, FilterError> {
     let c = &problem.coordinates;
     let solver = Solver {
@@ -116,7 +117,8 @@ fn ended(
         gain: problem.done(),
         relative_gain: 0.0,
         least_step: BUDGET.least_step,
-        models_end,
+        least_cost: least.map_or(f64::INFINITY, |least| -least),
+        models_end: least.is_none(),
     };
     let start = DVector::from_vec(c.of(&problem.clamp(start)));
     let end = recoverable(solver.minimise(&LogPosterior(problem), &start))?;
@@ -265,15 +267,18 @@ pub(crate) fn fit(
     Ok(None)
 }
 
-/// Places that climbs from several starts reach, best first; of equal ones that of the first start is first.
+/// Places that climbs from several starts reach, best first; of equal ones that of the first start is first. One that will not pass the best before it
+/// ends on its way.
 pub(crate) fn reached(
     problem: &Problem,
     starts: &[Vec<f64>],
     iterations: usize,
 ) -> Result<Vec<Reached>, FilterError> {
-    let mut ends = vec![];
+    let (mut ends, mut best) = (vec![], f64::NEG_INFINITY);
     for start in starts {
-        ends.extend(reach(problem, start, iterations)?);
+        let end = ended(problem, start, iterations, Some(best))?;
+        best = end.iter().fold(best, |best, end| best.max(end.objective));
+        ends.extend(end);
     }
     descending(&mut ends, |end| end.objective);
     Ok(ends)

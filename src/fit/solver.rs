@@ -80,6 +80,8 @@ pub(super) struct Solver<'a> {
     pub relative_gain: f64,
     /// Largest entry of a step at which the search ends.
     pub least_step: f64,
+    /// Cost that another search has reached: this one ends where it would stay above, if each iteration left took off what a step promises.
+    pub least_cost: f64,
     /// `true` where the model at the end is wanted.
     pub models_end: bool,
 }
@@ -182,6 +184,7 @@ impl Solver<'_> {
             .map(|((x, gradient), information)| (x, gradient, information))
             .ok_or_else(lost)?;
         let enough = self.gain + self.relative_gain * cost;
+        let left = (state.get_max_iters() - state.get_iter()) as f64;
         for _ in 0..self.trials {
             match self.step(x, gradient, information) {
                 DampedStep::Nowhere => return Ok(Trial::Ends(CONVERGED)),
@@ -189,10 +192,13 @@ impl Solver<'_> {
                 DampedStep::To(step) => {
                     let next = self.clamp(&(x + &step));
                     let moved = (&next - x).amax();
-                    if moved < self.least_step
-                        || -gradient.dot(&step) < BUDGET.least_promise * enough
-                    {
+                    let promise = -gradient.dot(&step);
+                    if moved < self.least_step || promise < BUDGET.least_promise * enough {
                         return Ok(Trial::Ends(CONVERGED));
+                    }
+                    if cost - left * promise > self.least_cost {
+                        let reason = "another search is out of reach";
+                        return Ok(Trial::Ends(TerminationReason::SolverExit(reason.into())));
                     }
                     // The cost alone tells whether to go there; the derivatives follow if so.
                     let there =

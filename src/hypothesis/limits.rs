@@ -19,8 +19,9 @@ numbers! {
         /// Longest lag or delay, as a share of the record: a longer one shows fewer than four times, and passes for the twin's own motion. At half
         /// of it, a delay of 0.15 records is told as two shorter ones.
         longest: f64 = 0.25,
-        /// Shortest lag or delay, in steps: less is nothing.
-        shortest: f64 = 0.3,
+        /// Shortest lag or delay, in steps. A delay of a fifth of a step is worth 127 nats where noise is a hundredth of the signal, and a lag that may not
+        /// be as short was named in its place. At half of it there are few nats to tell.
+        shortest: f64 = 0.05,
         /// Times of a change that are tried, evenly over the record.
         times: usize = 9,
         /// Share of the span of a state by which a level may lie beyond it: the twin that lacks the threshold follows the record with other values of

@@ -37,10 +37,7 @@ impl Library<'_> {
             // A rate that the twin defines as another state is no law that could be wrong.
             return Ok(vec![]);
         }
-        let mark = match effect.law() {
-            Law::Sensor(_) | Law::Rounding(_) => effect.kind().marks(&values),
-            _ => OutputMark::Unmarked,
-        };
+        let mark = mark(effect, &values);
         if mark == OutputMark::Absent {
             // The record refutes it: no value repeats, at an end or anywhere.
             return Ok(vec![]);
@@ -63,7 +60,7 @@ impl Library<'_> {
     }
 
     /// The hypothesis of an effect that the twin has, all of whose free magnitudes are used together; `None` where none is free. Those that readings show
-    /// are held there, as in [`terms`](Self::terms).
+    /// are held there, as in [`terms`](Self::terms), and off where readings would show them and do not.
     pub fn own(&self, effect: &Effect) -> Result<Option<Term>, FilterError> {
         let space = self.twin.parameters();
         let entry = |m: &Magnitude| space.position(&effect.key().magnitude(m.name)).ok();
@@ -81,7 +78,12 @@ impl Library<'_> {
         let Some(mut term) = self.ranged(term, &values, self.twin, true)? else {
             return Ok(None);
         };
-        if let OutputMark::Present(shown) = effect.kind().marks(&values) {
+        let shown = match mark(effect, &values) {
+            OutputMark::Present(shown) => Some(shown),
+            OutputMark::Absent => effect.magnitudes().iter().map(|m| m.off).collect(),
+            OutputMark::Unmarked => None,
+        };
+        if let Some(shown) = shown {
             let shown = shown_free(&term, &shown);
             let entries = term.entries.iter().flatten();
             let m = (entries.zip(&shown)).map(|(&j, value)| space[j].bounds.clamp(*value));
@@ -224,6 +226,14 @@ impl Library<'_> {
     pub fn frequency(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
         let times = (self.scales.dt(), self.scales.duration());
         frequency(parameter, times, self.frequencies)
+    }
+}
+
+/// Mark of an effect on the values that it bends.
+fn mark(effect: &Effect, values: &[f64]) -> OutputMark {
+    match effect.law() {
+        Law::Sensor(_) | Law::Rounding(_) => effect.kind().marks(values),
+        _ => OutputMark::Unmarked,
     }
 }
 

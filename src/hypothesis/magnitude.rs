@@ -117,11 +117,11 @@ impl Ranges<'_> {
 
     /// Limit of a rate: beyond the fastest step of the record it is off, below its slowest wander nothing passes.
     fn rate_limit(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
-        let size = self.size();
         let (low, high) = self.ends();
-        let grid = RATES.map(|share| share * (high - low) / self.dt).to_vec();
-        let range = (2.0 * size / self.duration, 2.0 * size / self.dt);
-        logarithmic(parameter, range, grid)
+        let fastest = (high - low).max(self.size()) / self.dt;
+        let grid = RATES.map(|share| share * fastest).to_vec();
+        let slowest = 2.0 * self.size() / self.duration;
+        logarithmic(parameter, (slowest, fastest), grid)
     }
 
     /// Level among the values, or beyond those of a state: uniform, and with longer steps.

@@ -54,6 +54,22 @@ pub(crate) fn on_line(times: &[f64], t: f64, value: impl Fn(usize) -> f64) -> f6
     (1.0 - share) * value(before) + share * value(after)
 }
 
+/// Mean of a signal between two times, held from each of its times to the next; at the first of both where they are one.
+fn mean_held(times: &[f64], [from, to]: [f64; 2], signal: &ArrayView1<'_, f64>) -> f64 {
+    let at = |t: f64| times.partition_point(|time| *time <= t).saturating_sub(1);
+    let (first, last) = (at(from), at(to));
+    let mut sum = 0.0;
+    for i in first..=last {
+        let begin = if i == first { from } else { times[i] };
+        let end = if i == last { to } else { times[i + 1] };
+        sum += (end - begin) * signal[i];
+    }
+    match first == last || from == to {
+        true => signal[first],
+        false => sum / (to - from),
+    }
+}
+
 impl Drive {
     /// A drive of step Δt = `dt` seconds with `inputs` (N × channels), its first row at 0 s.
     pub fn new(dt: f64, inputs: Signal) -> Result<Self, RecordError> {
@@ -212,20 +228,37 @@ impl Drive {
         })
     }
 
-    /// The same inputs later by so many seconds, linear between samples; the first ones before the start.
-    pub(crate) fn late(&self, delay: f64) -> Result<Self, RecordError> {
+    /// The same inputs later by so many seconds, each held or not; the first ones before the start.
+    pub(crate) fn late(
+        &self,
+        delay: f64,
+        are_held: impl IntoIterator<Item = bool>,
+    ) -> Result<Self, RecordError> {
         let mut inputs = self.inputs.as_ref().clone();
-        for mut input in inputs.columns_mut() {
-            let late = self.delayed(input.view(), delay);
+        for (mut input, is_held) in inputs.columns_mut().into_iter().zip(are_held) {
+            let late = self.delayed(input.view(), delay, is_held);
             input.assign(&late);
         }
         self.with_inputs(inputs)
     }
 
-    /// A signal at these times, later by so many seconds, linear between samples; its first value before the start.
-    pub(crate) fn delayed(&self, signal: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
+    /// A signal at these times, later by so many seconds; its first value before the start. It is linear between samples, or held: then each row has the
+    /// mean over its step, which is the same where steps are equal.
+    pub(crate) fn delayed(
+        &self,
+        signal: ArrayView1<'_, f64>,
+        delay: f64,
+        is_held: bool,
+    ) -> Array1<f64> {
         let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
-        let late = |k: usize| on_line(&times[..=k], times[k] - delay, |i| signal[i]);
+        let late = |k: usize| match is_held && !self.is_uniform() {
+            true => mean_held(
+                &times,
+                [times[k], times[k] + self.step(k)].map(|t| t - delay),
+                &signal,
+            ),
+            false => on_line(&times[..=k], times[k] - delay, |i| signal[i]),
+        };
         (0..self.samples()).map(late).collect()
     }
 

@@ -118,6 +118,7 @@ impl GaussNewton {
             gain: 0.0,
             relative_gain: self.tolerance,
             least_step: self.step_tolerance,
+            least_cost: f64::INFINITY,
             models_end: false,
         };
         match solver.minimise(&scaled, &start.component_div(scale)) {

@@ -3,9 +3,10 @@
 use crate::diagnose::fixture::{biased_record, listed_terms, tanks};
 use crate::fit::axis::EvidencePrior;
 
-/// A dead zone or a play may swallow every command, a lag may be long: a narrower search would hide the law that is missing.
+/// A dead zone or a play may swallow every command, a lag may be long, a delay short, and a limit of a rate just bite: a narrower search would hide the
+/// law that is missing.
 #[test]
-fn widths_and_lags_are_looked_for_all_over_the_record() {
+fn widths_times_and_rates_are_looked_for_all_over_the_record() {
     let study = tanks(60);
     let records = [biased_record(&study, 0.0, 5)];
     let terms = listed_terms(&study, &records);
@@ -19,8 +20,14 @@ fn widths_and_lags_are_looked_for_all_over_the_record() {
     }
     let lag = terms.iter().find(|term| term.id == "actuator-lag").unwrap();
     let longest = lag.starts.iter().map(|start| start.m[0]);
-    let duration = 4.0 * 60.0;
+    let (step, duration) = (4.0, 4.0 * 60.0);
     assert!(longest.fold(0.0, f64::max) > duration / 16.0);
+    let bounds = |id: &str| terms.iter().find(|term| term.id == id).unwrap().axes[0].bounds;
+    assert!(bounds("actuator-delay").low() < 0.1 * step);
+    let inputs: Vec<f64> = inputs.iter().copied().collect();
+    let jumps = inputs.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let fastest = jumps.fold(0.0, f64::max) / step;
+    assert!(bounds("actuator-rate-limit").high() >= fastest);
 }
 
 /// The twin's fit shows no way from nothing to a signal of which two thirds are rectified: larger parts are tried, too. A delay is

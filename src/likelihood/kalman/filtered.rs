@@ -258,7 +258,7 @@ impl Kalman<'_> {
             values: Signal::zeros(self.record.outputs().dim()),
             first: 0,
             skipped: vec![false; self.channels],
-            states: (order.before > 0).then(Vec::new),
+            states: (!order.is_plain()).then(Vec::new),
         };
         self.run_in(&order, theta, &mut all as &mut dyn Sink)?;
         if let Some(states) = all.states.take() {
@@ -283,7 +283,7 @@ impl Kalman<'_> {
             states: self.states,
             outputs: self.channels,
         };
-        let (samples, block) = (self.record.samples(), order.before);
+        let (samples, block) = (self.record.samples(), order.ahead());
         for first in (0..samples).step_by(block) {
             let shown = first.checked_sub(block + 1);
             to.first = first;

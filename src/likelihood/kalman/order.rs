@@ -10,6 +10,12 @@ use std::sync::Arc;
 /// row k                   y_j(k + d_j)             missing behind the end of the record
 /// ```
 ///
+/// Where steps vary, each value of such an output has a row of its own, at the first sample that is no more than the dead time before it:
+///
+/// ```text
+/// y_j(k)   behind the others of row i:   t_i ≥ t_k − d_j > t_{i−1}
+/// ```
+///
 /// A density of all values is the same in any order, and a filter need not remember d samples as states.
 #[derive(Clone)]
 pub(super) struct Order<'k> {
@@ -18,7 +24,9 @@ pub(super) struct Order<'k> {
     values: Values<'k>,
     channels: usize,
     /// Rows before the first.
-    pub before: usize,
+    before: usize,
+    /// Rows where steps vary and an output is late.
+    by_time: Option<Arc<[TimedRow]>>,
     /// `true` if outputs are missing.
     pub gaps: bool,
 }
@@ -30,10 +38,32 @@ enum Values<'k> {
     Arranged(Arc<[f64]>),
 }
 
+/// A row at a sample: its punctual outputs, or a value of a late one.
+#[derive(Clone, Copy)]
+struct TimedRow {
+    sample: usize,
+    late: Option<LateReading>,
+}
+
+/// A value that the record has at a later sample.
+#[derive(Clone, Copy)]
+struct LateReading {
+    output: usize,
+    sample: usize,
+    /// Time in seconds from the sample that is shown to that of the record.
+    after: f64,
+}
+
 impl<'k> Order<'k> {
     /// At θ, of which the length is checked.
     pub fn of(kalman: &'k Kalman<'_>, theta: &[f64]) -> Result<Self, FilterError> {
         kalman.check(theta)?;
+        if !kalman.record.drive().is_uniform() {
+            let delays = kalman.twin.delays(theta);
+            if delays.iter().any(|delay| *delay > 0.0) {
+                return Ok(Self::by_time(kalman, &delays));
+            }
+        }
         let dead_time = (kalman.twin).dead_time(theta, kalman.record.drive().dt());
         let before = dead_time.iter().copied().max().unwrap_or(0);
         let mut order = Self {
@@ -41,12 +71,52 @@ impl<'k> Order<'k> {
             values: Values::Own(kalman.record.values()),
             channels: kalman.channels,
             before,
+            by_time: None,
             gaps: kalman.gaps || before > 0,
         };
         if before > 0 {
-            order.values = Values::Arranged(order.arranged(kalman.record.values()));
+            let rows = before + kalman.record.samples();
+            order.values = Values::Arranged(order.arranged(rows, kalman.record.values()));
         }
         Ok(order)
+    }
+
+    /// Rows of a record whose steps vary, its outputs late by so many seconds.
+    fn by_time(kalman: &'k Kalman<'_>, delays: &[f64]) -> Self {
+        let drive = kalman.record.drive();
+        let times: Vec<f64> = (0..drive.samples()).map(|k| drive.time(k)).collect();
+        let mut rows: Vec<TimedRow> = (0..times.len())
+            .map(|sample| TimedRow { sample, late: None })
+            .collect();
+        let mut dead_time = vec![0; kalman.channels];
+        for (output, delay) in delays.iter().enumerate().filter(|(_, delay)| **delay > 0.0) {
+            for (sample, time) in times.iter().enumerate() {
+                let shown = times.partition_point(|t| *t < time - delay);
+                let after = time - times[shown];
+                dead_time[output] = dead_time[output].max(sample - shown).max(1);
+                let late = Some(LateReading {
+                    output,
+                    sample,
+                    after,
+                });
+                rows.push(TimedRow {
+                    sample: shown,
+                    late,
+                });
+            }
+        }
+        rows.sort_by_key(|row| row.sample);
+        let mut order = Self {
+            dead_time,
+            values: Values::Own(&[]),
+            channels: kalman.channels,
+            before: 0,
+            gaps: true,
+            by_time: Some(rows.into()),
+        };
+        let rows = order.by_time.as_ref().map_or(0, |rows| rows.len());
+        order.values = Values::Arranged(order.arranged(rows, kalman.record.values()));
+        order
     }
 
     /// The same without the outputs that are late, and without rows before the first.
@@ -62,14 +132,15 @@ impl<'k> Order<'k> {
             values: Values::Arranged(values.into()),
             channels: self.channels,
             before: 0,
+            by_time: None,
             gaps: true,
         }
     }
 
-    fn arranged(&self, outputs: &[f64]) -> Arc<[f64]> {
+    fn arranged(&self, rows: usize, outputs: &[f64]) -> Arc<[f64]> {
         let p = self.channels;
         let samples = outputs.len() / p;
-        (0..(self.before + samples) * p)
+        (0..rows * p)
             .map(|cell| match self.sample_of(cell / p, cell % p) {
                 Some(k) if k < samples => outputs[k * p + cell % p],
                 _ => f64::NAN,
@@ -109,11 +180,48 @@ impl<'k> Order<'k> {
     /// Sample of the state that row i shows.
     #[inline(always)]
     pub fn state_of(&self, i: usize) -> usize {
-        i.saturating_sub(self.before)
+        match &self.by_time {
+            None => i.saturating_sub(self.before),
+            Some(rows) => rows[i].sample,
+        }
+    }
+
+    /// Returns whether row i is the last that shows its sample.
+    #[inline(always)]
+    pub fn ends_sample(&self, i: usize) -> bool {
+        match &self.by_time {
+            None => i >= self.before,
+            Some(rows) => rows
+                .get(i + 1)
+                .is_none_or(|next| next.sample > rows[i].sample),
+        }
+    }
+
+    /// Time in seconds from the sample that row i shows to where its late output is read; `None` where whole samples tell it.
+    #[inline(always)]
+    pub fn read_after(&self, i: usize) -> Option<f64> {
+        let late = self.by_time.as_ref()?[i].late;
+        Some(late.map_or(0.0, |late| late.after))
+    }
+
+    /// Returns whether rows are those of the record.
+    pub fn is_plain(&self) -> bool {
+        self.before == 0 && self.by_time.is_none()
+    }
+
+    /// Most samples by which an output is ahead of those that are punctual.
+    pub fn ahead(&self) -> usize {
+        self.dead_time.iter().copied().max().unwrap_or(0)
     }
 
     /// Sample at which the record has output j of row i, perhaps behind its end; `None` where the row before the first has none.
     pub fn sample_of(&self, i: usize, j: usize) -> Option<usize> {
+        if let Some(rows) = &self.by_time {
+            return match rows[i].late {
+                Some(late) => (late.output == j).then_some(late.sample),
+                None => (!self.is_late(j)).then_some(rows[i].sample),
+            };
+        }
         let late = self.dead_time.get(j).copied().unwrap_or(0);
         match i.checked_sub(self.before) {
             Some(k) => Some(k + late),

@@ -205,8 +205,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         state.set(self.state.belief(n));
         for i in self.row..end {
             self.measure(i, &mut state, &mut root, sink)?;
-            if i >= self.order.before && i + 1 < self.order.rows() {
-                self.go_on(i - self.order.before, &mut state, &mut root, sink);
+            if i + 1 < self.order.rows() && self.order.ends_sample(i) {
+                self.go_on(self.order.state_of(i), &mut state, &mut root, sink);
             }
         }
         self.state.set(state.belief(n));
@@ -284,6 +284,9 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         let (n, p) = (self.size.states(), self.size.outputs());
         let k = self.order.state_of(i);
         self.go_to(k, state);
+        if let Some(time) = self.order.read_after(i) {
+            self.now.each(|_, now| now.read_after = Some(time));
+        }
         for (j, y) in self.y.numbers_mut()[..p].iter_mut().enumerate() {
             *y = N::of_lanes(|lane| {
                 let job = &self.jobs[held_by(lane, self.jobs.len())];
@@ -323,7 +326,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 row: i,
             },
         );
-        if i >= self.order.before {
+        if self.order.ends_sample(i) {
             sink.filtered(k, state.belief(n));
         }
         Ok(())

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::record::{Drive, RecordError, Signal};
 use crate::twin::points::Layout;
-use crate::twin::{Now, SimulationError, Workspace};
+use crate::twin::{Hold, Now, SimulationError, Workspace};
 use smallvec::SmallVec;
 
 /// Outputs of points that are kept on the stack.
@@ -211,7 +211,7 @@ impl Composed {
             self.resolved(now, |now| {
                 for (added, _, follows) in self.parts.memories() {
                     let value = match follows.of {
-                        Seen::Input(input) if self.is_amount(input) => 0.0,
+                        Seen::Input(input) if self.hold_of(input) == Hold::Impulse => 0.0,
                         of => self.seen(of, now, x),
                     };
                     follows.by.begin(value, &mut x[added.states.clone()]);
@@ -272,6 +272,11 @@ impl Composed {
         all
     }
 
+    /// Returns the delay of each output in seconds; empty where none has one.
+    pub(crate) fn delays(&self, theta: &[f64]) -> Vec<f64> {
+        self.take_delays(&mut self.complete(theta).to_vec())
+    }
+
     /// Delays of sensors.
     fn late_sensors(&self) -> impl Iterator<Item = &LawPart> {
         let is_late = |part: &&LawPart| part.is_dead_time && matches!(part.law, Law::Sensor(_));
@@ -302,11 +307,15 @@ impl Composed {
             acting = Some(match &added.part {
                 TwinPart::Law(part) => match &part.law {
                     Law::Actuator(law) => {
-                        part.act(law.as_ref(), &theta, (before, self.is_amount(part.target)))?
+                        part.act(law.as_ref(), &theta, (before, self.hold_of(part.target)))?
                     }
                     _ => continue,
                 },
-                TwinPart::Late(_) => (before.late(self.parts.delay(added.delays, &theta)))
+                TwinPart::Late(_) => before
+                    .late(
+                        self.parts.delay(added.delays, &theta),
+                        self.holds().into_iter().map(|hold| hold == Hold::Zero),
+                    )
                     .map_err(SimulationError::of)?,
                 _ => continue,
             });
@@ -321,7 +330,10 @@ impl LawPart {
     fn magnitudes<R>(&self, now: &Now<'_>, then: impl FnOnce(&[f64]) -> R) -> R {
         let m = self.m(now.theta);
         match self.is_dead_time {
-            true => then(&[m[0] - whole_samples(m[0], now.dt) as f64 * now.dt]),
+            true => {
+                let whole = || whole_samples(m[0], now.dt) as f64 * now.dt;
+                then(&[m[0] - now.read_after.unwrap_or_else(whole)])
+            }
             false => then(m),
         }
     }
@@ -332,18 +344,20 @@ impl LawPart {
         law: &dyn SignalChange,
         theta: &[f64],
         drive: &Drive,
-        (signal, is_amount): (&mut Signal, bool),
+        (signal, hold): (&mut Signal, Hold),
     ) {
         let of = signal.column(self.target);
-        let late = match (self.is_dead_time, is_amount) {
-            (true, true) => Some(drive.delayed_amounts(of, self.m(theta)[0])),
-            (true, false) if !drive.is_uniform() => Some(drive.delayed(of, self.m(theta)[0])),
+        let late = match (self.is_dead_time, hold) {
+            (true, Hold::Impulse) => Some(drive.delayed_amounts(of, self.m(theta)[0])),
+            (true, _) if !drive.is_uniform() => {
+                Some(drive.delayed(of, self.m(theta)[0], hold == Hold::Zero))
+            }
             _ => None,
         };
         if let Some(late) = late {
             return signal.column_mut(self.target).assign(&late);
         }
-        let first = if is_amount { 0.0 } else { of[0] };
+        let first = if hold == Hold::Impulse { 0.0 } else { of[0] };
         let mut memory = vec![first; self.memory];
         let on = LawPlace {
             target: 0,
@@ -371,10 +385,10 @@ impl LawPart {
         &self,
         law: &dyn SignalChange,
         theta: &[f64],
-        (drive, is_amount): (&Drive, bool),
+        (drive, hold): (&Drive, Hold),
     ) -> Result<Drive, SimulationError> {
         let mut inputs = drive.inputs().clone();
-        self.pass(law, theta, drive, (&mut inputs, is_amount));
+        self.pass(law, theta, drive, (&mut inputs, hold));
         drive.with_inputs(inputs).map_err(|error| match error {
             RecordError::NotFinite { sample, .. } => SimulationError::Diverged {
                 at: drive.time(sample),

@@ -51,6 +51,8 @@ pub struct Now<'a> {
     pub(crate) first_time: f64,
     /// Time that the start belongs to, the first row's or one before it: delays count from there.
     pub(crate) begun: f64,
+    /// Time in seconds by which an output that shows this sample late is read after it; `None` where that is as many whole samples as its dead time has.
+    pub(crate) read_after: Option<f64>,
 }
 
 impl<'a> Now<'a> {
@@ -66,6 +68,7 @@ impl<'a> Now<'a> {
             between: None,
             first_time: 0.0,
             begun: 0.0,
+            read_after: None,
         }
     }
 

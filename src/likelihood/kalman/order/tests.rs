@@ -3,13 +3,16 @@
 use crate::effect::{Catalogue, Effect, EffectKind, augment};
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{Noise, Now, Outline, Parameter, StateSpace, Twin, fix};
+use crate::twin::{Integrator, Noise, Now, Outline, Parameter, StateSpace, Twin, fix};
 
 const LATE: usize = 6;
 const STEP: f64 = 0.2;
 
-/// A leak that is pushed, seen by two sensors.
-struct Leak;
+/// A leak that is pushed, seen by two sensors; with this process noise of a step.
+struct Leak(f64, Integrator);
+
+/// Without process noise, whatever its steps are.
+const QUIET: Leak = Leak(0.0, Integrator::Adaptive);
 
 impl StateSpace for Leak {
     fn outline(&self) -> Outline {
@@ -19,6 +22,9 @@ impl StateSpace for Leak {
             .input("u", "m/s")
             .output("now", "m")
             .output("later", "m")
+    }
+    fn integrator(&self) -> Integrator {
+        self.1
     }
     fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
         dx[0] = now.u[0] - now.theta[0] * x[0];
@@ -33,20 +39,25 @@ impl StateSpace for Leak {
         std[0] = 0.5;
     }
     fn noise(&self, _: &Now<'_>, _: &[f64], process: &mut [f64], measurement: &mut [f64]) {
-        process[0] = 0.3;
+        process[0] = self.0;
         measurement.copy_from_slice(&[0.4, 0.1]);
     }
 }
 
 /// The leak whose second sensor shows it some samples later, by an effect.
-fn late(effect: &Effect) -> Twin {
-    let twin = augment(Twin::new(Leak), vec![effect.clone()]).unwrap();
+fn late(leak: Leak, effect: &Effect) -> Twin {
+    let twin = augment(Twin::new(leak), vec![effect.clone()]).unwrap();
     fix(twin, &effect.given_by_parameter().collect()).unwrap()
 }
 
+/// The leak whose second sensor is late by so many seconds.
+fn late_by(leak: Leak, delay: f64) -> Twin {
+    let effect = Catalogue::default().effect("sensor-delay", "sensor2");
+    late(leak, &effect.unwrap().hold("delay", delay))
+}
+
 fn by_dead_time() -> Twin {
-    let delay = Catalogue::default().effect("sensor-delay", "sensor2");
-    late(&delay.unwrap().hold("delay", LATE as f64 * STEP))
+    late_by(Leak(0.3, Integrator::Euler), LATE as f64 * STEP)
 }
 
 fn by_register() -> Twin {
@@ -57,7 +68,10 @@ fn by_register() -> Twin {
     });
     let register = register.memory(LATE + 1);
     let library = Catalogue::default().with(register);
-    late(&library.effect("register", "sensor2").unwrap())
+    late(
+        Leak(0.3, Integrator::Euler),
+        &library.effect("register", "sensor2").unwrap(),
+    )
 }
 
 fn record(seed: u64) -> Record {
@@ -140,5 +154,59 @@ fn predictions_do_not_see_the_future() {
     }));
     for ((own, best), most) in own.iter().zip(best).zip([1.3, 2.0]) {
         assert!((0.95..most).contains(&(own / best)), "{own} of {best}");
+    }
+}
+
+/// Rows at uneven times: without process noise a filter that knows the start predicts each output as a run has it, a late one between samples as well.
+#[test]
+fn a_dead_time_counts_seconds_where_steps_vary() {
+    let times: Vec<f64> = (0..60)
+        .map(|k: u32| STEP * (f64::from(k) + f64::from(k * k % 5) * 0.17 + f64::from(k / 20)))
+        .collect();
+    let inputs = Signal::from_shape_fn((times.len(), 1), |(k, _)| (0.3 * k as f64).sin());
+    let drive = Drive::with_times(&times, inputs).unwrap();
+    for delay in [0.05, 0.3, 1.23] {
+        let twin = late_by(QUIET, delay);
+        let outputs = twin.free_run(&[0.7], &drive).unwrap();
+        let record = Record::new(drive.clone(), outputs.clone()).unwrap();
+        let [filtered, predicted] = [true, false].map(|all| {
+            with(&twin, &record, |k| match all {
+                true => k.filter(&[0.7]).unwrap().predictions(&outputs),
+                false => k.predictions(&[0.7]).unwrap(),
+            })
+        });
+        for found in [filtered, predicted] {
+            let off = (&found - &outputs)
+                .iter()
+                .fold(0.0, |off: f64, d| off.max(d.abs()));
+            assert!(off < 1e-6, "{delay} s: {off}");
+        }
+    }
+}
+
+/// Rows that are left out say no more than rows without values, where each late value shows a sample that is there.
+#[test]
+fn rows_that_are_left_out_are_rows_without_values() {
+    let is_there = |k: &usize| ![2, 3].contains(&(k % LATE));
+    let rows: Vec<usize> = (0..90).filter(is_there).collect();
+    let input =
+        |k: usize| (0.3 * (if is_there(&k) { k } else { k / LATE * LATE + 1 }) as f64).sin();
+    let drive = Drive::new(STEP, Signal::from_shape_fn((90, 1), |(k, _)| input(k))).unwrap();
+    let twin = late_by(QUIET, LATE as f64 * STEP);
+    let outputs = twin.simulate(&[0.7], &drive, Noise::new(3, "late", 0));
+    let outputs = outputs.unwrap();
+    let mut empty = outputs.clone();
+    for k in (0..90).filter(|k| !is_there(k)) {
+        empty.row_mut(k).fill(f64::NAN);
+    }
+    let whole = Record::new(drive, empty).unwrap();
+    let times: Vec<f64> = rows.iter().map(|k| STEP * *k as f64).collect();
+    let of_rows = |signal: &Signal| signal.select(ndarray::Axis(0), &rows);
+    let drive = Drive::with_times(&times, of_rows(whole.drive().inputs())).unwrap();
+    let fewer = Record::new(drive, of_rows(&outputs)).unwrap();
+    for theta in [[0.7], [1.1]] {
+        let [one, other] = [&whole, &fewer]
+            .map(|record| with(&twin, record, |k| k.log_likelihood(&theta).unwrap()));
+        assert!((one - other).abs() < 1e-4, "{one} {other}");
     }
 }

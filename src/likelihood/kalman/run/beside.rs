@@ -56,7 +56,7 @@ impl<'k> SideBySide<'k> {
         let lanes: Vec<Option<usize>> = (all.iter().take(LANES))
             .map(|&(kalman, theta)| {
                 let order = Order::of(kalman, theta).ok()?;
-                let is_plain = Readings::of(&kalman.twin, theta).is_none() && order.before == 0;
+                let is_plain = Readings::of(&kalman.twin, theta).is_none() && order.is_plain();
                 jobs.push(is_plain.then(|| kalman.job(&order, theta).ok())??);
                 Some(jobs.len() - 1)
             })
