@@ -255,9 +255,8 @@ fn values(
             unit: p.unit.clone(),
             value,
             std_error: errors[j],
-            // At a bound, draws may lie on one side of the value alone.
-            low: spread.low[j].min(value),
-            high: spread.high[j].max(value),
+            low: spread.low[j],
+            high: spread.high[j],
             by_profile: false,
             at_bound: certificate.at_bound[j],
         });

@@ -60,7 +60,7 @@ impl Library<'_> {
     }
 
     /// The hypothesis of an effect that the twin has, all of whose free magnitudes are used together; `None` where none is free. Those that readings show
-    /// are held there, as in [`terms`](Self::terms), and off where readings would show them and do not.
+    /// are held there, as in [`terms`](Self::terms), and ends of a range that readings would show and do not where they are off.
     pub fn own(&self, effect: &Effect) -> Result<Option<Term>, FilterError> {
         let space = self.twin.parameters();
         let entry = |m: &Magnitude| space.position(&effect.key().magnitude(m.name)).ok();
@@ -80,7 +80,11 @@ impl Library<'_> {
         };
         let shown = match mark(effect, &values) {
             OutputMark::Present(shown) => Some(shown),
-            OutputMark::Absent => effect.magnitudes().iter().map(|m| m.off).collect(),
+            OutputMark::Absent => {
+                let ends = effect.magnitudes().iter().map(|m| m.off);
+                ends.map(|off| off.filter(|off| off.is_infinite()))
+                    .collect()
+            }
             OutputMark::Unmarked => None,
         };
         if let Some(shown) = shown {

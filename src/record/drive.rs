@@ -54,7 +54,7 @@ pub(crate) fn on_line(times: &[f64], t: f64, value: impl Fn(usize) -> f64) -> f6
     (1.0 - share) * value(before) + share * value(after)
 }
 
-/// Mean of a signal between two times, held from each of its times to the next; at the first of both where they are one.
+/// Mean of a signal between two times, held from each of its times to the next.
 fn mean_held(times: &[f64], [from, to]: [f64; 2], signal: &ArrayView1<'_, f64>) -> f64 {
     let at = |t: f64| times.partition_point(|time| *time <= t).saturating_sub(1);
     let (first, last) = (at(from), at(to));
@@ -64,7 +64,7 @@ fn mean_held(times: &[f64], [from, to]: [f64; 2], signal: &ArrayView1<'_, f64>) 
         let end = if i == last { to } else { times[i + 1] };
         sum += (end - begin) * signal[i];
     }
-    match first == last || from == to {
+    match first == last {
         true => signal[first],
         false => sum / (to - from),
     }
@@ -228,7 +228,8 @@ impl Drive {
         })
     }
 
-    /// The same inputs later by so many seconds, each held or not; the first ones before the start.
+    /// The same inputs later by so many seconds; the first ones before the start. Those that are held have their mean over each step, which with equal
+    /// steps is the value on the line between two.
     pub(crate) fn late(
         &self,
         delay: f64,
@@ -236,30 +237,33 @@ impl Drive {
     ) -> Result<Self, RecordError> {
         let mut inputs = self.inputs.as_ref().clone();
         for (mut input, is_held) in inputs.columns_mut().into_iter().zip(are_held) {
-            let late = self.delayed(input.view(), delay, is_held);
+            let late = match is_held && !self.is_uniform() {
+                true => self.delayed_steps(input.view(), delay),
+                false => self.delayed(input.view(), delay),
+            };
             input.assign(&late);
         }
         self.with_inputs(inputs)
     }
 
-    /// A signal at these times, later by so many seconds; its first value before the start. It is linear between samples, or held: then each row has the
-    /// mean over its step, which is the same where steps are equal.
-    pub(crate) fn delayed(
-        &self,
-        signal: ArrayView1<'_, f64>,
-        delay: f64,
-        is_held: bool,
-    ) -> Array1<f64> {
+    /// A signal at these times, later by so many seconds, linear between samples; its first value before the start.
+    pub(crate) fn delayed(&self, signal: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
         let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
-        let late = |k: usize| match is_held && !self.is_uniform() {
-            true => mean_held(
-                &times,
-                [times[k], times[k] + self.step(k)].map(|t| t - delay),
-                &signal,
-            ),
-            false => on_line(&times[..=k], times[k] - delay, |i| signal[i]),
-        };
+        let late = |k: usize| on_line(&times[..=k], times[k] - delay, |i| signal[i]);
         (0..self.samples()).map(late).collect()
+    }
+
+    /// A signal that is held between samples, later by so many seconds: its mean over each step.
+    fn delayed_steps(&self, signal: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
+        let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
+        let ends = |k: usize| [times[k], times[k] + self.step(k)].map(|t| t - delay);
+        let mut late: Array1<f64> = (0..times.len())
+            .map(|k| mean_held(&times, ends(k), &signal))
+            .collect();
+        for k in (0..times.len()).rev().filter(|k| self.is_repeated(*k)) {
+            late[k] = late[k + 1];
+        }
+        late
     }
 
     /// Amounts at these times, later by so many seconds, 0 at least: one that falls between two times is shared by both, more of it at the nearer

@@ -175,7 +175,11 @@ fn off(fit: &Fit) -> Option<f64> {
 }
 
 fn headline(fit: &Fit) -> String {
-    let (count, samples) = (fit.parameters.len(), fit.samples);
+    // What readings show is not fitted, and has no error.
+    let count = (fit.parameters.iter())
+        .filter(|p| p.std_error != 0.0)
+        .count();
+    let samples = fit.samples;
     let parameters = match count {
         1 => "parameter",
         _ => "parameters",

@@ -9,7 +9,7 @@ use crate::math::{deviation, quantile};
 use crate::twin::Noise;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Standard errors and intervals of θ of the first record.
+/// Standard errors of θ of the first record, and intervals, which hold it.
 pub(crate) struct FitIntervals {
     pub errors: Vec<f64>,
     pub low: Vec<f64>,
@@ -48,14 +48,19 @@ impl FitIntervals {
             let columns: Vec<Vec<f64>> = (0..d)
                 .map(|j| draws.iter().map(|theta| theta[j]).collect())
                 .collect();
-            let ends = |p: f64| -> Vec<f64> {
-                let end = |column: &Vec<f64>| quantile(column, p).unwrap_or(f64::NAN);
-                columns.iter().map(end).collect()
+            // At a bound, draws may lie on one side of the value alone.
+            let ends = |p: f64, outer: fn(f64, f64) -> f64| -> Vec<f64> {
+                let columns = columns.iter().zip(&fitted.theta);
+                let end = |(column, value): (&Vec<f64>, &f64)| match quantile(column, p) {
+                    Ok(end) => outer(end, *value),
+                    Err(_) => f64::NAN,
+                };
+                columns.map(end).collect()
             };
             return Self {
                 errors: columns.iter().map(|column| deviation(column)).collect(),
-                low: ends(0.5 - 0.5 * level),
-                high: ends(0.5 + 0.5 * level),
+                low: ends(0.5 - 0.5 * level, f64::min),
+                high: ends(0.5 + 0.5 * level, f64::max),
             };
         }
         let c = &problem.coordinates;

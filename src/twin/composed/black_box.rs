@@ -6,7 +6,7 @@ use super::parts::{Added, Parts, Theta};
 use super::simulation::check_length;
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Hold, Integrator, KnownNoise, Noise, NoisePart, Now, Outline, ParameterSpace,
+    DigitalTwin, Integrator, KnownNoise, Noise, NoisePart, Now, Outline, ParameterSpace,
     SimulationError, Stepping,
 };
 use std::sync::Arc;
@@ -132,7 +132,7 @@ impl ComposedBlackBox {
         match part {
             TwinPart::Law(part) => match &part.law {
                 Law::Actuator(law) => {
-                    return inner(theta, &part.act(law.as_ref(), theta, (drive, Hold::Zero))?);
+                    return inner(theta, &part.act(law.as_ref(), theta, (drive, false))?);
                 }
                 Law::Parameter(law) => {
                     return self.followed(inside, (part, law.as_ref()), theta, (drive, noise));
@@ -170,12 +170,7 @@ impl ComposedBlackBox {
                 }
                 match &part.law {
                     Law::Sensor(law) | Law::Reading(law) => {
-                        part.pass(
-                            law.as_ref(),
-                            theta,
-                            drive,
-                            (&mut outputs.signal, Hold::Linear),
-                        );
+                        part.pass(law.as_ref(), theta, drive, (&mut outputs.signal, false));
                     }
                     Law::MeasurementNoise(law) => {
                         let source = format!("sensor-noise/{}", part.target);

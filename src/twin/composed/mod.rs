@@ -209,10 +209,10 @@ impl Composed {
         self.parts.outline.holds(self.stepping().hold)
     }
 
-    /// Returns what an input is between samples.
-    pub(super) fn hold_of(&self, input: usize) -> Hold {
+    /// Returns whether an input is an amount, given at its row.
+    pub(super) fn is_amount(&self, input: usize) -> bool {
         let outline = &self.parts.outline;
-        outline.hold_of(&outline.inputs[input], self.stepping().hold)
+        outline.hold_of(&outline.inputs[input], self.stepping().hold) == Hold::Impulse
     }
 
     /// Returns buffers for its motion.

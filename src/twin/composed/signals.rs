@@ -211,7 +211,7 @@ impl Composed {
             self.resolved(now, |now| {
                 for (added, _, follows) in self.parts.memories() {
                     let value = match follows.of {
-                        Seen::Input(input) if self.hold_of(input) == Hold::Impulse => 0.0,
+                        Seen::Input(input) if self.is_amount(input) => 0.0,
                         of => self.seen(of, now, x),
                     };
                     follows.by.begin(value, &mut x[added.states.clone()]);
@@ -307,16 +307,15 @@ impl Composed {
             acting = Some(match &added.part {
                 TwinPart::Law(part) => match &part.law {
                     Law::Actuator(law) => {
-                        part.act(law.as_ref(), &theta, (before, self.hold_of(part.target)))?
+                        part.act(law.as_ref(), &theta, (before, self.is_amount(part.target)))?
                     }
                     _ => continue,
                 },
-                TwinPart::Late(_) => before
-                    .late(
-                        self.parts.delay(added.delays, &theta),
-                        self.holds().into_iter().map(|hold| hold == Hold::Zero),
-                    )
-                    .map_err(SimulationError::of)?,
+                TwinPart::Late(_) => {
+                    let are_held = self.holds().into_iter().map(|hold| hold == Hold::Zero);
+                    let late = before.late(self.parts.delay(added.delays, &theta), are_held);
+                    late.map_err(SimulationError::of)?
+                }
                 _ => continue,
             });
         }
@@ -344,20 +343,18 @@ impl LawPart {
         law: &dyn SignalChange,
         theta: &[f64],
         drive: &Drive,
-        (signal, hold): (&mut Signal, Hold),
+        (signal, is_amount): (&mut Signal, bool),
     ) {
         let of = signal.column(self.target);
-        let late = match (self.is_dead_time, hold) {
-            (true, Hold::Impulse) => Some(drive.delayed_amounts(of, self.m(theta)[0])),
-            (true, _) if !drive.is_uniform() => {
-                Some(drive.delayed(of, self.m(theta)[0], hold == Hold::Zero))
-            }
+        let late = match (self.is_dead_time, is_amount) {
+            (true, true) => Some(drive.delayed_amounts(of, self.m(theta)[0])),
+            (true, false) if !drive.is_uniform() => Some(drive.delayed(of, self.m(theta)[0])),
             _ => None,
         };
         if let Some(late) = late {
             return signal.column_mut(self.target).assign(&late);
         }
-        let first = if hold == Hold::Impulse { 0.0 } else { of[0] };
+        let first = if is_amount { 0.0 } else { of[0] };
         let mut memory = vec![first; self.memory];
         let on = LawPlace {
             target: 0,
@@ -385,10 +382,10 @@ impl LawPart {
         &self,
         law: &dyn SignalChange,
         theta: &[f64],
-        (drive, hold): (&Drive, Hold),
+        (drive, is_amount): (&Drive, bool),
     ) -> Result<Drive, SimulationError> {
         let mut inputs = drive.inputs().clone();
-        self.pass(law, theta, drive, (&mut inputs, hold));
+        self.pass(law, theta, drive, (&mut inputs, is_amount));
         drive.with_inputs(inputs).map_err(|error| match error {
             RecordError::NotFinite { sample, .. } => SimulationError::Diverged {
                 at: drive.time(sample),
