@@ -161,6 +161,8 @@ mod tests {
             also: vec![],
         };
         let study = tanks(60);
+        let told = super::super::statement::sentence(&Units::of(&study), &fit).unwrap();
+        assert!(told.contains("sees nothing above 0.901"), "{told}");
         let table = study_table(&Units::of(&study), &fit).unwrap();
         assert!(table.contains("{ low = -inf, high = 0.9014 }"), "{table}");
         let file = StudyFile::parse(&format!("twin = \"tanks\"\n{table}"), Path::new("s.toml"));

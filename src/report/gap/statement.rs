@@ -358,11 +358,13 @@ pub(super) fn sentence(units: &Units, fit: &EffectFit) -> Option<String> {
     let mut text = (template.replace("{place}", &units.in_words(&fit.target)))
         .replace("{other}", other.as_deref().unwrap_or("nothing"));
     for (name, value) in &fit.magnitudes {
+        if value.is_infinite() {
+            // The other end of a range is all that is told.
+            text = text.replace(&format!("below {{{name}}} or "), "");
+            text = text.replace(&format!(" or above {{{name}}}"), "");
+        }
         let unit = units.of_magnitude(&fit.id, &fit.target, name);
-        let written = match value.is_finite() {
-            true => with_unit(*value, &unit.unwrap_or_default()),
-            false => "any value".to_owned(),
-        };
+        let written = with_unit(*value, &unit.unwrap_or_default());
         text = text.replace(&format!("{{{name}}}"), &written);
         text = text.replace(&format!("{{%{name}}}"), &percent(*value));
     }
