@@ -258,6 +258,19 @@ impl<'a> Doubts<'a> {
         self.all.push(doubt);
     }
 
+    /// Returns whether a bound is of what the records can show of a magnitude, within its own ones.
+    fn is_end_of_record(&self, name: &str, side: Side) -> bool {
+        let space = self.problem.twin.parameters();
+        let Ok(j) = space.position(name) else {
+            return false;
+        };
+        let [shown, own] = [self.problem.axes[j].bounds, space[j].bounds];
+        match side {
+            Side::Low => shown.low() > own.low(),
+            Side::High => shown.high() < own.high(),
+        }
+    }
+
     /// Warns of parameters, magnitudes and noise levels at a bound.
     pub fn bounds(
         &mut self,
@@ -270,6 +283,9 @@ impl<'a> Doubts<'a> {
         for p in parameters {
             let Some(side) = p.at_bound else { continue };
             let mut doubt = Warning::at_bound("at-bound", &p.name, side);
+            if self.is_end_of_record(&p.name, side) {
+                doubt.remedy = "hold it where it is known to lie beyond: records show values in this range alone";
+            }
             if is_off(p) {
                 let mut same = parameters.iter().filter(|other| effect(other) == effect(p));
                 doubt.what = format!("{} lies where the effect is off", p.name);

@@ -183,10 +183,15 @@ impl Ranges<'_> {
         logarithmic(parameter, (0.003 * span, 0.5 * span), grid)
     }
 
-    /// Width in the signal: beyond the widest, a dead zone or a play lets nothing pass.
+    /// Width in the signal: beyond the widest, a dead zone or a play lets nothing pass. Readings are behind the play of a sensor, which may have taken off
+    /// as much of them as it left.
     fn width(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
         let (low, high) = self.ends();
-        let widest = (2.0 * low.abs().max(high.abs())).max((high - low).max(1e-9));
+        let seen = match self.effect.law().target() {
+            TargetKind::Sensor => 0.5,
+            _ => 1.0,
+        };
+        let widest = (2.0 * low.abs().max(high.abs())).max((high - low).max(1e-9)) / seen;
         let size = self.size();
         let grid = WIDTHS.map(|share| share * size).to_vec();
         linear(parameter, (0.0, widest), grid)
