@@ -172,12 +172,10 @@ impl<'a, 't> TableEntry<'a, 't> {
         let Some(value) = keys.get(key) else {
             return Ok(None);
         };
-        let ends: Vec<f64> = (value.get_ref().as_array())
-            .map(|all| all.iter().filter_map(|end| number(end.get_ref())).collect())
-            .unwrap_or_default();
-        let given = value.get_ref().as_array().map_or(0, |all| all.len());
-        match ends[..] {
-            [low, high] if given == 2 => match Interval::new(low, high) {
+        let ends: Option<Vec<f64>> = (value.get_ref().as_array())
+            .and_then(|all| all.iter().map(|end| number(end.get_ref())).collect());
+        match ends.as_deref() {
+            Some(&[low, high]) => match Interval::new(low, high) {
                 Ok(interval) => Ok(Some(interval)),
                 Err(error) => self.source.error(value.span().start, error.to_string()),
             },

@@ -257,9 +257,8 @@ impl Drive {
     fn delayed_steps(&self, signal: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
         let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
         let ends = |k: usize| [times[k], times[k] + self.step(k)].map(|t| t - delay);
-        let mut late: Array1<f64> = (0..times.len())
-            .map(|k| mean_held(&times, ends(k), &signal))
-            .collect();
+        let late = (0..times.len()).map(|k| mean_held(&times, ends(k), &signal));
+        let mut late: Array1<f64> = late.collect();
         for k in (0..times.len()).rev().filter(|k| self.is_repeated(*k)) {
             late[k] = late[k + 1];
         }

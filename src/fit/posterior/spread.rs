@@ -50,12 +50,10 @@ impl FitIntervals {
                 .collect();
             // At a bound, draws may lie on one side of the value alone.
             let ends = |p: f64, outer: fn(f64, f64) -> f64| -> Vec<f64> {
-                let columns = columns.iter().zip(&fitted.theta);
-                let end = |(column, value): (&Vec<f64>, &f64)| match quantile(column, p) {
-                    Ok(end) => outer(end, *value),
-                    Err(_) => f64::NAN,
+                let end = |(column, value): (&Vec<f64>, &f64)| {
+                    quantile(column, p).map_or(f64::NAN, |end| outer(end, *value))
                 };
-                columns.map(end).collect()
+                columns.iter().zip(&fitted.theta).map(end).collect()
             };
             return Self {
                 errors: columns.iter().map(|column| deviation(column)).collect(),

@@ -75,8 +75,7 @@ impl<'k> Order<'k> {
             gaps: kalman.gaps || before > 0,
         };
         if before > 0 {
-            let rows = before + kalman.record.samples();
-            order.values = Values::Arranged(order.arranged(rows, kalman.record.values()));
+            order.values = Values::Arranged(order.arranged(kalman.record.values()));
         }
         Ok(order)
     }
@@ -85,23 +84,20 @@ impl<'k> Order<'k> {
     fn by_time(kalman: &'k Kalman<'_>, delays: &[f64]) -> Self {
         let drive = kalman.record.drive();
         let times: Vec<f64> = (0..drive.samples()).map(|k| drive.time(k)).collect();
-        let mut rows: Vec<TimedRow> = (0..times.len())
-            .map(|sample| TimedRow { sample, late: None })
-            .collect();
-        let mut dead_time = vec![0; kalman.channels];
-        for (output, delay) in delays.iter().enumerate().filter(|(_, delay)| **delay > 0.0) {
-            for (sample, time) in times.iter().enumerate() {
+        let (mut rows, mut dead_time) = (vec![], vec![0; kalman.channels]);
+        for (sample, time) in times.iter().enumerate() {
+            rows.push(TimedRow { sample, late: None });
+            for (output, delay) in delays.iter().enumerate().filter(|(_, d)| **d > 0.0) {
                 let shown = times.partition_point(|t| *t < time - delay);
-                let after = time - times[shown];
                 dead_time[output] = dead_time[output].max(sample - shown).max(1);
-                let late = Some(LateReading {
+                let late = LateReading {
                     output,
                     sample,
-                    after,
-                });
+                    after: time - times[shown],
+                };
                 rows.push(TimedRow {
                     sample: shown,
-                    late,
+                    late: Some(late),
                 });
             }
         }
@@ -114,8 +110,7 @@ impl<'k> Order<'k> {
             gaps: true,
             by_time: Some(rows.into()),
         };
-        let rows = order.by_time.as_ref().map_or(0, |rows| rows.len());
-        order.values = Values::Arranged(order.arranged(rows, kalman.record.values()));
+        order.values = Values::Arranged(order.arranged(kalman.record.values()));
         order
     }
 
@@ -137,9 +132,10 @@ impl<'k> Order<'k> {
         }
     }
 
-    fn arranged(&self, rows: usize, outputs: &[f64]) -> Arc<[f64]> {
+    fn arranged(&self, outputs: &[f64]) -> Arc<[f64]> {
         let p = self.channels;
         let samples = outputs.len() / p;
+        let rows = (self.by_time.as_ref()).map_or(self.before + samples, |rows| rows.len());
         (0..rows * p)
             .map(|cell| match self.sample_of(cell / p, cell % p) {
                 Some(k) if k < samples => outputs[k * p + cell % p],
