@@ -137,6 +137,16 @@ impl Axis {
         matches!(self.evidence, EvidencePrior::Magnitude { .. }) && self.bounds.low() >= 0.0
     }
 
+    /// The period of an angle: its bounds hold each value more than once, and evidence counts it once.
+    pub fn period(&self) -> Option<f64> {
+        match self.evidence {
+            EvidencePrior::Uniform { low, high } if !self.is_log => {
+                Some(high - low).filter(|turn| self.bounds.width() > 1.5 * turn)
+            }
+            _ => None,
+        }
+    }
+
     /// The same axis, held in the prior box of its parameter.
     pub fn inside(mut self, prior: Interval) -> Self {
         let low = self.bounds.low().max(prior.low());

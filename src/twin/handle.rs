@@ -170,6 +170,11 @@ impl Twin {
         all.map(|hold| *hold == Hold::Impulse).collect()
     }
 
+    /// Returns the time that its start belongs to; `None` for the first row of a record.
+    pub(crate) fn begins(&self) -> Option<f64> {
+        self.equations()?.begins()
+    }
+
     /// Returns the adaptive substeps of a run without noise at θ; `None` for fixed steps, a run that diverges, and a black box.
     pub(crate) fn steps_taken(&self, theta: &[f64], drive: &Drive) -> Option<StepsTaken> {
         self.equations()?.steps_taken(theta, drive).ok()?

@@ -69,9 +69,9 @@ fn augmented(base: Twin, effects: Vec<Effect>, may_be_late: bool) -> Result<Twin
     }
     // Along a signal, in the order of the library.
     placed.sort_by_key(|(effect, _)| effect.kind().position());
-    // What waits for its delay would miss a dose.
-    let has_doses = base.doses().contains(&true);
-    let may_be_late = may_be_late && signals.outputs.len() == 1 && outline.is_some() && !has_doses;
+    // What waits for its delay would miss a dose, and what begins before its first row has moved by then.
+    let misses = base.doses().contains(&true) || base.begins().is_some();
+    let may_be_late = may_be_late && signals.outputs.len() == 1 && outline.is_some() && !misses;
     let is_late = |effect: &Effect| {
         may_be_late && effect.kind().is_dead_time() && matches!(effect.law(), Law::Sensor(_))
     };

@@ -45,8 +45,13 @@ impl FitIntervals {
         first.sort_unstable();
         first.dedup();
         if first.len() >= BUDGET.interval_draws {
+            // Draws of an angle lie within half a turn of it.
+            let near = |j: usize, v: f64| match problem.axes[j].period() {
+                Some(turn) => v - turn * ((v - fitted.theta[j]) / turn).round(),
+                None => v,
+            };
             let columns: Vec<Vec<f64>> = (0..d)
-                .map(|j| draws.iter().map(|theta| theta[j]).collect())
+                .map(|j| draws.iter().map(|theta| near(j, theta[j])).collect())
                 .collect();
             // At a bound, draws may lie on one side of the value alone.
             let ends = |p: f64, outer: fn(f64, f64) -> f64| -> Vec<f64> {

@@ -90,10 +90,15 @@ impl<'k> Order<'k> {
             for (output, delay) in delays.iter().enumerate().filter(|(_, d)| **d > 0.0) {
                 let shown = times.partition_point(|t| *t < time - delay);
                 dead_time[output] = dead_time[output].max(sample - shown).max(1);
+                // Before the first row, its value stands.
+                let after = match shown {
+                    0 => f64::INFINITY,
+                    shown => time - times[shown],
+                };
                 let late = LateReading {
                     output,
                     sample,
-                    after: time - times[shown],
+                    after,
                 };
                 rows.push(TimedRow {
                     sample: shown,
