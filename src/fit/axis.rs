@@ -157,3 +157,22 @@ impl Axis {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{PI, TAU};
+
+    /// Bounds of two turns hold each angle twice, those of one hold it once; another shape has no turns.
+    #[test]
+    fn angles_have_a_period() {
+        let axis = |reach: f64, evidence| Axis {
+            evidence,
+            ..Axis::of(&Parameter::new("phase", "rad", -reach, reach))
+        };
+        let once = EvidencePrior::Uniform { low: -PI, high: PI };
+        assert_eq!(axis(TAU, once).period(), Some(TAU));
+        assert_eq!(axis(PI, once).period(), None);
+        assert_eq!(axis(TAU, EvidencePrior::Normal).period(), None);
+    }
+}

@@ -244,3 +244,42 @@ pub(super) fn swallowed(
     });
     Ok(all.min_by(|a, b| (a.without / a.with).total_cmp(&(b.without / b.with))))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Catalogue, augment, augment_late};
+    use crate::equations::Equations;
+    use crate::record::{Drive, Record};
+    use crate::twin::{Twin, fix};
+
+    const DECAY: &str = "[twin]\nname = 'decay'\n[parameters]\nc = { prior = [0.1, 1.0] }\n\
+        [states]\nh = { rate = '-c*h', start = { value = 2.0, at = -1.5 } }\n\
+        [outputs]\ny = { value = 'h', noise = 0.01 }\n";
+
+    /// A sensor that lags, or is late, has seen what went on before the first row: the free run begins with what it remembers of that, as the filter does.
+    #[test]
+    fn effects_remember_the_time_before_the_first_row() {
+        for (id, magnitude, value) in [("sensor-lag", "tau", 1.2), ("sensor-delay", "delay", 0.3)] {
+            let effect = Catalogue::default().effect(id, "sensor").unwrap();
+            let effect = effect.hold(magnitude, value);
+            let base = Twin::new(Equations::parse(DECAY).unwrap());
+            for augment in [augment, augment_late] {
+                let twin = augment(base.clone(), vec![effect.clone()]).unwrap();
+                let twin = fix(twin, &effect.given_by_parameter().collect()).unwrap();
+                let drive = Drive::autonomous(0.25, 30).unwrap();
+                let outputs = twin.free_run(&[0.6], &drive).unwrap();
+                let record = Record::new(drive, outputs.clone()).unwrap();
+                let problem = Problem::of_twin(&twin, vec![record]);
+                let followed = FollowedRecords::new(&problem, &[0.6]).unwrap();
+                let run = followed.free_runs[0].as_ref().unwrap();
+                let off = (run - &outputs)
+                    .iter()
+                    .fold(0.0, |off: f64, d| off.max(d.abs()));
+                assert!(off < 1e-9, "{id}: {off}");
+                let step = followed.errors[0].one_step;
+                assert!(step < 1e-6, "{id}: {step}");
+            }
+        }
+    }
+}
