@@ -82,7 +82,7 @@ pub(crate) fn climb(
     start: &[f64],
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
-    match ended(problem, start, iterations, None)? {
+    match ended(problem, start, iterations, (true, f64::NEG_INFINITY))? {
         Some(end) => end.fitted(problem),
         None => Ok(None),
     }
@@ -94,15 +94,15 @@ pub(crate) fn reach(
     start: &[f64],
     iterations: usize,
 ) -> Result<Option<Reached>, FilterError> {
-    ended(problem, start, iterations, Some(f64::NEG_INFINITY))
+    ended(problem, start, iterations, (false, f64::NEG_INFINITY))
 }
 
-/// As [`climb`], with derivatives at the end, or for those who ask for the place alone, if it has more than this objective.
+/// As [`climb`], with derivatives at the end or without, and no farther than it takes to see that no more than `least` is in reach.
 fn ended(
     problem: &Problem,
     start: &[f64],
     iterations: usize,
-    least: Option<f64>,
+    (models_end, least): (bool, f64),
 ) -> Result<Option<Reached>, FilterError> {
     let c = &problem.coordinates;
     let solver = Solver {
@@ -117,8 +117,8 @@ fn ended(
         gain: problem.done(),
         relative_gain: 0.0,
         least_step: BUDGET.least_step,
-        least_cost: least.map_or(f64::INFINITY, |least| -least),
-        models_end: least.is_none(),
+        least_cost: -least,
+        models_end,
     };
     let start = DVector::from_vec(c.of(&problem.clamp(start)));
     let end = recoverable(solver.minimise(&LogPosterior(problem), &start))?;
@@ -276,7 +276,7 @@ pub(crate) fn reached(
 ) -> Result<Vec<Reached>, FilterError> {
     let (mut ends, mut best) = (vec![], f64::NEG_INFINITY);
     for start in starts {
-        let end = ended(problem, start, iterations, Some(best))?;
+        let end = ended(problem, start, iterations, (false, best))?;
         best = end.iter().fold(best, |best, end| best.max(end.objective));
         ends.extend(end);
     }

@@ -258,7 +258,7 @@ impl<'a> Doubts<'a> {
         self.all.push(doubt);
     }
 
-    /// Returns whether a bound is of what the records can show of a magnitude, within its own ones.
+    /// Returns whether a search ends at what the records can show, before the bound of the parameter itself.
     fn is_end_of_record(&self, name: &str, side: Side) -> bool {
         let space = self.problem.twin.parameters();
         let Ok(j) = space.position(name) else {

@@ -65,16 +65,18 @@ pub(crate) fn free_runs(
     theta: &[f64],
     first: &[Gaussian],
 ) -> Result<Vec<Option<Signal>>, FilterError> {
-    let is_known =
-        |r: usize| problem.twin.begins().is_some() && first[r].cov.iter().all(|c| *c == 0.0);
     (problem.records.iter().enumerate())
         .map(|(r, record)| {
             let own = problem.of_record(r, theta);
-            let twin = match first.get(r).map(|first| &first.mean) {
-                Some(first) if first.iter().any(|x| !x.is_finite()) => return Ok(None),
+            let twin = match first.get(r) {
+                Some(first) if first.mean.iter().any(|x| !x.is_finite()) => return Ok(None),
                 // What effects remember of the time before the first row is in the twin's own run alone.
-                Some(_) if is_known(r) => problem.twin.clone(),
-                Some(first) => begun(&problem.twin, first, record.drive().dt())?,
+                Some(first)
+                    if problem.twin.begins().is_some() && first.cov.iter().all(|c| *c == 0.0) =>
+                {
+                    problem.twin.clone()
+                }
+                Some(first) => begun(&problem.twin, &first.mean, record.drive().dt())?,
                 None => problem.twin.clone(),
             };
             match twin.free_run(&own, record.drive()) {

@@ -80,11 +80,9 @@ impl Library<'_> {
         };
         let shown = match mark(effect, &values) {
             OutputMark::Present(shown) => Some(shown),
-            OutputMark::Absent => {
-                let ends = effect.magnitudes().iter().map(|m| m.off);
-                ends.map(|off| off.filter(|off| off.is_infinite()))
-                    .collect()
-            }
+            OutputMark::Absent => (effect.magnitudes().iter())
+                .map(|m| m.off.filter(|off| off.is_infinite()))
+                .collect(),
             OutputMark::Unmarked => None,
         };
         if let Some(shown) = shown {

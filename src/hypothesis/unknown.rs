@@ -62,11 +62,7 @@ pub(crate) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
             )
         })
         .collect();
-    let instants = |record: &Record| -> Vec<f64> {
-        (0..record.samples())
-            .map(|k| record.drive().time(k))
-            .collect()
-    };
+    let instants = |record: &Record| record.drive().times();
     let time = visited(scales.records.iter().map(instants)).map(|(low, high)| Variable {
         name: "t".to_owned(),
         of: Of::Time,

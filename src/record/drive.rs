@@ -248,27 +248,31 @@ impl Drive {
 
     /// A signal at these times, later by so many seconds, linear between samples; its first value before the start.
     pub(crate) fn delayed(&self, signal: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
-        let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
+        let times = self.times();
         let late = |k: usize| on_line(&times[..=k], times[k] - delay, |i| signal[i]);
         (0..self.samples()).map(late).collect()
     }
 
     /// A signal that is held between samples, later by so many seconds: its mean over each step.
     fn delayed_steps(&self, signal: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
-        let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
+        let times = self.times();
         let ends = |k: usize| [times[k], times[k] + self.step(k)].map(|t| t - delay);
         let late = (0..times.len()).map(|k| mean_held(&times, ends(k), &signal));
-        let mut late: Array1<f64> = late.collect();
-        for k in (0..times.len()).rev().filter(|k| self.is_repeated(*k)) {
-            late[k] = late[k + 1];
+        self.replicated(late.collect())
+    }
+
+    /// A signal of which the last row of each time is known, at all rows of it.
+    fn replicated(&self, mut signal: Array1<f64>) -> Array1<f64> {
+        for k in (0..self.samples()).rev().filter(|k| self.is_repeated(*k)) {
+            signal[k] = signal[k + 1];
         }
-        late
+        signal
     }
 
     /// Amounts at these times, later by so many seconds, 0 at least: one that falls between two times is shared by both, more of it at the nearer
     /// one, so that none is lost but behind the last.
     pub(crate) fn delayed_amounts(&self, amounts: ArrayView1<'_, f64>, delay: f64) -> Array1<f64> {
-        let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
+        let times = self.times();
         // An amount is told at each reading of its time, and is given once.
         let last_of = |k: usize| (k..).find(|k| !self.is_repeated(*k)).unwrap_or(k);
         let mut late = Array1::zeros(times.len());
@@ -287,10 +291,7 @@ impl Drive {
                 late[last_of(after)] += share * amount;
             }
         }
-        for k in (0..times.len()).rev().filter(|k| self.is_repeated(*k)) {
-            late[k] = late[k + 1];
-        }
-        late
+        self.replicated(late)
     }
 
     /// A drive without inputs, N = `samples`.
@@ -371,6 +372,11 @@ impl Drive {
     /// Inputs, N × channels, in row-major order.
     pub fn inputs(&self) -> &Signal {
         &self.inputs
+    }
+
+    /// Times of all samples, in seconds from the first.
+    pub(crate) fn times(&self) -> Vec<f64> {
+        (0..self.samples()).map(|k| self.time(k)).collect()
     }
 
     /// Time of sample k, in seconds from the first; steps of Δt behind the last.

@@ -4,7 +4,7 @@ use super::chart::Style;
 use super::digits::{short, with_unit};
 use super::document::Column::{Number, Text};
 use super::document::{Block, Document};
-use super::record::{RecordPicture, Run, times};
+use super::record::{RecordPicture, Run};
 use crate::fit::{Fit, FitScore, OutputErrors};
 use crate::record::Record;
 use crate::study::Study;
@@ -120,7 +120,7 @@ pub(crate) fn compare_svg(all: &[ComparedStudy], record: &Record) -> String {
     RecordPicture {
         title: "Studies on one record".into(),
         outputs: &outputs,
-        times: &times(record),
+        times: &record.drive().times(),
         measured: record.outputs(),
         runs: runs.collect(),
         spans: &|_| vec![],

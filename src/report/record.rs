@@ -112,18 +112,13 @@ pub(crate) fn overlay_svg(
     RecordPicture {
         title: format!("{}: record and twin", study.name()),
         outputs: &study.twin().signals().outputs,
-        times: &times(record),
+        times: &record.drive().times(),
         measured: record.outputs(),
         runs: before.into_iter().chain(after).collect(),
         spans: &|_| vec![],
         marks: vec![],
     }
     .svg()
-}
-
-pub(super) fn times(record: &Record) -> Vec<f64> {
-    let drive = record.drive();
-    (0..record.samples()).map(|k| drive.time(k)).collect()
 }
 
 /// CSV with a row a sample: `t`, then for each output what was measured, and what the twin shows without noise before
@@ -148,7 +143,7 @@ pub(crate) fn trajectories_csv(record: &Record, before: Option<&Signal>, after: 
     }
     let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
     let mut text = format!("t,{}\n", names.join(","));
-    for (k, time) in times(record).into_iter().enumerate() {
+    for (k, time) in record.drive().times().into_iter().enumerate() {
         text.push_str(&format!("{time:.9}"));
         for (_, column) in &columns {
             text.push_str(&format!(",{}", column[k]));

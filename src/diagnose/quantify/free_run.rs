@@ -75,9 +75,8 @@ pub(in crate::diagnose) fn free_runs(
     base: Option<&Runner>,
     grown: Option<&Runner>,
 ) -> FreeRuns {
-    let drive = record.drive();
     FreeRuns {
-        times: (0..drive.samples()).map(|k| drive.time(k)).collect(),
+        times: record.drive().times(),
         measured: record.outputs().clone(),
         before: base.and_then(|base| base.outputs(record)),
         after: grown.and_then(|grown| grown.outputs(record)),

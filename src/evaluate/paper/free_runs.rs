@@ -65,8 +65,7 @@ impl MeanRuns {
         for run in runs {
             let one = AnswerRuns::of(study, plan, run)?;
             if times.is_empty() {
-                let drive = one.record.drive();
-                times = (0..drive.samples()).map(|k| drive.time(k)).collect();
+                times = one.record.drive().times();
             }
             add(&mut truth, one.truth);
             for (sum, (_, signal)) in answers.iter_mut().zip(one.answers) {

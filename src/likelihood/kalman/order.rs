@@ -82,8 +82,7 @@ impl<'k> Order<'k> {
 
     /// Rows of a record whose steps vary, its outputs late by so many seconds.
     fn by_time(kalman: &'k Kalman<'_>, delays: &[f64]) -> Self {
-        let drive = kalman.record.drive();
-        let times: Vec<f64> = (0..drive.samples()).map(|k| drive.time(k)).collect();
+        let times = kalman.record.drive().times();
         let (mut rows, mut dead_time) = (vec![], vec![0; kalman.channels]);
         for (sample, time) in times.iter().enumerate() {
             rows.push(TimedRow { sample, late: None });

@@ -146,24 +146,33 @@ fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
 mod tests {
     use super::*;
     use crate::diagnose::fixture::tanks;
+    use crate::report::gap::statement::sentence;
     use crate::study::StudyFile;
     use std::path::Path;
 
-    /// A side that is off stays so: a magnitude that is left out would be estimated.
-    #[test]
-    fn a_table_has_the_magnitudes_that_are_off() {
-        let fit = EffectFit {
+    /// A range that ends above alone.
+    fn clipping() -> EffectFit {
+        EffectFit {
             id: "sensor-clipping".into(),
             target: "sensor".into(),
             probability: 1.0,
             magnitudes: vec![("low".into(), f64::NEG_INFINITY), ("high".into(), 0.9014)],
             log_evidence: 9.0,
             also: vec![],
-        };
-        let study = tanks(60);
-        let told = super::super::statement::sentence(&Units::of(&study), &fit).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_range_that_ends_on_one_side_is_told_by_that_end() {
+        let told = sentence(&Units::of(&tanks(60)), &clipping()).unwrap();
         assert!(told.contains("sees nothing above 0.901"), "{told}");
-        let table = study_table(&Units::of(&study), &fit).unwrap();
+    }
+
+    /// A side that is off stays so: a magnitude that is left out would be estimated.
+    #[test]
+    fn a_table_has_the_magnitudes_that_are_off() {
+        let study = tanks(60);
+        let table = study_table(&Units::of(&study), &clipping()).unwrap();
         assert!(table.contains("{ low = -inf, high = 0.9014 }"), "{table}");
         let file = StudyFile::parse(&format!("twin = \"tanks\"\n{table}"), Path::new("s.toml"));
         let added = study.configure(&file.unwrap()).unwrap();

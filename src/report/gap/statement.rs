@@ -364,7 +364,10 @@ pub(super) fn sentence(units: &Units, fit: &EffectFit) -> Option<String> {
             text = text.replace(&format!(" or above {{{name}}}"), "");
         }
         let unit = units.of_magnitude(&fit.id, &fit.target, name);
-        let written = with_unit(*value, &unit.unwrap_or_default());
+        let written = match value.is_finite() {
+            true => with_unit(*value, &unit.unwrap_or_default()),
+            false => "any value".to_owned(),
+        };
         text = text.replace(&format!("{{{name}}}"), &written);
         text = text.replace(&format!("{{%{name}}}"), &percent(*value));
     }

@@ -55,8 +55,7 @@ pub fn mean_runs_svg(study: &Study, means: &MeanRuns) -> Option<String> {
 
 /// One record and free runs at what it made of the pretrained network, of the final answer, and of both baselines from their bad starts.
 pub fn first_run_svg(study: &Study, runs: &AnswerRuns) -> String {
-    let drive = runs.record.drive();
-    let times: Vec<f64> = (0..drive.samples()).map(|k| drive.time(k)).collect();
+    let times = runs.record.drive().times();
     let outputs = study.twin().signals().outputs;
     let theirs: Belongs = |m| matches!(m, ScoredMethod::PredictionError(start) | ScoredMethod::DualFilter(start) if start == Bad);
     let panels = (outputs.iter().enumerate())

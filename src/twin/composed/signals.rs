@@ -274,7 +274,7 @@ impl Composed {
 
     /// Returns the delay of each output in seconds; empty where none has one.
     pub(crate) fn delays(&self, theta: &[f64]) -> Vec<f64> {
-        self.take_delays(&mut self.complete(theta).to_vec())
+        self.take_delays(&mut self.complete(theta))
     }
 
     /// Delays of sensors.
