@@ -28,7 +28,27 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// `true` where the process was asked to stop, and its work ends with what was found.
+static HASTE: AtomicBool = AtomicBool::new(false);
+/// `true` while what was found is put together.
+static ENDING: AtomicBool = AtomicBool::new(false);
+
+/// Has black boxes give up their simulations until what was found is put together: a pass over a record may take many.
+pub(crate) fn hasten() {
+    HASTE.store(true, Ordering::Relaxed);
+}
+
+/// Says whether what was found is put together.
+pub(crate) fn put_together(ending: bool) {
+    ENDING.store(ending, Ordering::Relaxed);
+}
+
+/// Returns whether simulations of black boxes are given up.
+pub(crate) fn is_hastened() -> bool {
+    HASTE.load(Ordering::Relaxed) && !ENDING.load(Ordering::Relaxed)
+}
 
 /// Receiver of progress, implemented by an application; it can also stop long work.
 ///

@@ -40,7 +40,10 @@ pub(super) fn write(
     posterior: &Posterior,
 ) -> Result<(), Failure> {
     let mut csv = csv::Writer::from_writer(vec![]);
-    let head = posterior.names.iter().map(String::as_str).chain(["mode"]);
+    // A parameter may have that name.
+    let is_taken = posterior.names.iter().any(|name| name == "mode");
+    let last = if is_taken { "mode (posterior)" } else { "mode" };
+    let head = posterior.names.iter().map(String::as_str).chain([last]);
     csv.write_record(head).map_err(Failure::internal)?;
     for (row, mode) in posterior.values.rows().into_iter().zip(&posterior.modes) {
         let cells = row.iter().map(f64::to_string).chain([mode.to_string()]);

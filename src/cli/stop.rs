@@ -5,6 +5,7 @@ use super::failure::{Failure, STOPPED, say};
 use super::remedy::Cause;
 use super::shell_word;
 use crate::external::program::end_all;
+use crate::progress::{hasten, is_hastened};
 use crate::storage::work::has_pieces;
 use crate::storage::{remove_unfinished, result};
 use std::ffi::OsString;
@@ -64,6 +65,9 @@ pub(super) fn listen(verb: &dyn Verb, call: &[OsString]) {
         if ASKED.swap(true, Ordering::Relaxed) {
             end();
         }
+        if ENDS.load(Ordering::Relaxed) {
+            hasten();
+        }
         let _ = thread::Builder::new().spawn(leave);
     };
     // An application around this command line keeps its own handler.
@@ -80,6 +84,9 @@ fn leave() {
     thread::sleep(MOMENT);
     let Some(stop) = STOP.get() else { return };
     if ENDS.load(Ordering::Relaxed) {
+        if is_hastened() {
+            end_all();
+        }
         say("stopping at the next step of the search; Ctrl-C again ends at once");
         return;
     }

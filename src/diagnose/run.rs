@@ -144,7 +144,7 @@ fn contradicts_start(
 ) -> bool {
     let is_explained = found.known.log_z() - found.known.twin().log_z <= THRESHOLDS.gap;
     let elsewhere = || start_elsewhere(study.twin(), records, &settings.beliefs(study));
-    !found.is_partial && !is_explained && elsewhere().is_some()
+    !found.is_partial && !is_explained && elsewhere().is_some_and(|start| !start.is_held)
 }
 
 impl Study {

@@ -153,6 +153,11 @@ impl Effect {
         (self.magnitudes().iter()).filter_map(|m| Some((self.key.magnitude(m.name), m.off?)))
     }
 
+    /// Returns the names in θ of all magnitudes, with what each is.
+    pub(crate) fn named_magnitudes(&self) -> impl Iterator<Item = (String, &Magnitude)> + '_ {
+        (self.magnitudes().iter()).map(|m| (self.key.magnitude(m.name), m))
+    }
+
     /// Returns the table that a file holds of it.
     pub fn entry(&self) -> EffectEntry {
         let other = |key| {

@@ -56,10 +56,10 @@ fn bytes_in(raw: &str, text: &str) -> Vec<usize> {
     let mut bytes = Vec::with_capacity(text.len());
     for c in text.chars() {
         let mut rest = raw.get(at..).unwrap_or_default();
-        // What ends a line is left out behind the first quotes and behind a stroke, and its return always is.
+        // What ends a line is left out behind the first quotes and behind a stroke; of its return the text may be without, too.
         loop {
             let skipped = match rest.as_bytes() {
-                [b'\r', b'\n', ..] => 1,
+                [b'\r', b'\n', ..] if c != '\r' => 1,
                 [b'\n', ..] if c != '\n' => 1,
                 [b'\\', b' ' | b'\t' | b'\r' | b'\n', ..] if !is_literal => {
                     rest.len() - rest[1..].trim_start().len()

@@ -277,7 +277,9 @@ fn unread(error: SafeTensorError) -> String {
         | E::InvalidHeader
         | E::InvalidHeaderStart
         | E::InvalidHeaderDeserialization => foreign(),
-        E::InvalidHeaderLength | E::MetadataIncompleteBuffer => not_whole("it is cut off"),
+        E::InvalidHeaderLength | E::MetadataIncompleteBuffer => {
+            not_whole("it is cut off, or goes on behind its end")
+        }
         _ => not_whole("its tensors are damaged"),
     }
 }

@@ -1,7 +1,7 @@
 //! Budget of a fit: its cost, and the tolerances at which it ends.
 
 use crate::likelihood::kalman::FilterError;
-use crate::progress::{Cancelled, Progress};
+use crate::progress::{Cancelled, Progress, put_together};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -209,11 +209,13 @@ impl Passes {
     /// Lets the passes go on from here whoever asks: what was found is put together.
     pub fn go_on(&self) {
         self.0.goes_on.store(true, Ordering::Relaxed);
+        put_together(true);
     }
 
     /// Asks again.
     fn ask(&self) {
         self.0.goes_on.store(false, Ordering::Relaxed);
+        put_together(false);
     }
 
     pub fn so_far(&self) -> u64 {
@@ -247,7 +249,7 @@ impl FitStages {
             return Ok(without);
         }
         match stage() {
-            Err(FilterError::Cancelled(_)) if self.gives_partial => {
+            Err(error) if self.gives_partial && error.is_cancelled() => {
                 self.is_cut = true;
                 // The answer is put together yet.
                 self.passes.go_on();

@@ -3,13 +3,13 @@
 use super::follow::Swallowed;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
+use super::searched::WithoutEffects;
 use crate::likelihood::{StartElsewhere, rounded};
 use crate::math::{is_constant, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
 use crate::setting::{number, unit_suffix};
 use crate::twin::conformance::{StepLength, step_length};
 use crate::twin::{Hold, Side, Stepping, Twin};
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Code of a free run that diverges.
@@ -19,8 +19,11 @@ pub(crate) const STILL_OUTPUT: &str = "constant-output";
 /// Code of a free run that shows nothing of the record.
 pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 
+/// Remedy of what is off.
+const LEAVE_OUT: &str = "leave the effect out: the record does not ask for it";
+
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 22] = [
+const REMEDIES: [(&str, &str); 23] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",
@@ -71,6 +74,10 @@ const REMEDIES: [(&str, &str); 22] = [
     (
         NOT_CONVERGED,
         "narrow the priors, or fix a parameter, a start or a noise level that the record does not identify",
+    ),
+    (
+        "not-asked",
+        "leave out what the record does not ask for, one effect at a time",
     ),
     (
         "process-noise",
@@ -167,8 +174,12 @@ impl Warning {
         };
         let unit = unit_suffix(&output.unit);
         let [value, expected] = [start.value, start.expected].map(|v| number(three_digits(v)));
+        let fate = match start.is_held {
+            true => "is declared, and stands",
+            false => "is taken as unknown",
+        };
         let what = format!(
-            "{which} begins at {} = {value}{unit}, the start of {} is {expected}{unit} there: it is taken as unknown",
+            "{which} begins at {} = {value}{unit}, the start says {expected}{unit}: that of {} {fate}",
             output.name,
             start.states.join(", ")
         );
@@ -276,9 +287,10 @@ impl<'a> Doubts<'a> {
         &mut self,
         parameters: &[FittedValue],
         noise: &[FittedNoise],
-        off: &BTreeMap<String, f64>,
+        without: Option<&WithoutEffects>,
     ) {
-        let is_off = |p: &FittedValue| off.get(&p.name) == Some(&p.value);
+        let off = |p: &FittedValue| without?.off(self.problem, &p.name);
+        let is_off = |p: &FittedValue| off(p) == Some(p.value);
         let effect = |p: &FittedValue| p.name.rsplit_once('.').map(|(effect, _)| effect.to_owned());
         for p in parameters {
             let Some(side) = p.at_bound else { continue };
@@ -289,10 +301,8 @@ impl<'a> Doubts<'a> {
             if is_off(p) {
                 let mut same = parameters.iter().filter(|other| effect(other) == effect(p));
                 doubt.what = format!("{} lies where the effect is off", p.name);
-                doubt.remedy = match same
-                    .all(|other| is_off(other) || !off.contains_key(&other.name))
-                {
-                    true => "leave the effect out: the record does not ask for it",
+                doubt.remedy = match same.all(|other| is_off(other) || off(other).is_none()) {
+                    true => LEAVE_OUT,
                     false => "hold it there: the record does not ask for this part of the effect",
                 };
             }
@@ -313,6 +323,19 @@ impl<'a> Doubts<'a> {
                 };
             }
             self.all.push(doubt);
+        }
+    }
+
+    /// Warns of effects that gain no evidence, unless one of them is [off](Self::bounds) or the [search](Self::search) has not arrived.
+    pub fn effects(&mut self, gained: Option<f64>) {
+        let speaks = |doubt: &Warning| doubt.remedy == LEAVE_OUT || doubt.code == NOT_CONVERGED;
+        let is_told = self.all.iter().any(speaks);
+        if let Some(gained) = gained.filter(|gained| *gained < 0.0 && !is_told) {
+            let less = number(three_digits(-gained));
+            self.warn(
+                "not-asked",
+                format!("the fitted effects gain no evidence: {less} nats less than without them"),
+            );
         }
     }
 

@@ -14,12 +14,14 @@
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `profile.rs` | what the records alone say of a parameter |
+//! | `absent.rs` | what the records say for the fitted effects |
 //! | `hold.rs` | the rule for inputs between samples that the records ask for |
 //! | `reference.rs` | linear gain of a direction beside θ |
 //! | `doubts.rs` | reasons to doubt a result, in one list |
 //! | `posterior/` | draws of θ given the records, as a table, as errors and intervals, as a region |
 //! | `least_squares/` | the solver on residuals |
 
+mod absent;
 pub(crate) mod axis;
 mod budget;
 pub(crate) mod certificate;
@@ -55,5 +57,5 @@ pub(crate) use profile::{ProfilesOf, depth};
 pub(crate) use run::{Subject, run};
 pub use score::FitScore;
 pub(crate) use score::score;
-pub(crate) use searched::{Searched, fits};
+pub(crate) use searched::{Searched, WithoutEffects, fits};
 pub(crate) use starts::spectral_starts;

@@ -203,6 +203,8 @@ pub struct FitEvidence {
     pub std_error: Option<f64>,
     /// Number of independent draws that the correction is worth.
     pub effective_draws: f64,
+    /// log Z over that of the twin with its fitted effects off: what they gain; none where none are fitted.
+    pub gained: Option<f64>,
 }
 
 impl From<Evidence> for FitEvidence {
@@ -212,6 +214,7 @@ impl From<Evidence> for FitEvidence {
             laplace: of.laplace,
             std_error: of.error,
             effective_draws: of.effective,
+            gained: None,
         }
     }
 }

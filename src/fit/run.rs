@@ -13,7 +13,7 @@ use super::posterior::{
 };
 use super::problem::Problem;
 use super::profile::{Profile, ProfilesOf, profiles};
-use super::searched::Searched;
+use super::searched::{Searched, WithoutEffects};
 use super::starts::{agreed, agreeing, polish};
 use crate::fit::budget::{BUDGET, FitStages, ITERATIONS};
 use crate::likelihood::kalman::FilterError;
@@ -41,7 +41,6 @@ pub(crate) fn run(
         problem,
         mut fits,
         without,
-        off,
     } = searched;
     let restarts = noise.child("restarts");
     let arrived = stages.of(false, || restarted(&problem, &mut fits, restarts))?;
@@ -58,11 +57,7 @@ pub(crate) fn run(
     else {
         return Ok(None);
     };
-    let evidence_by = |draws| evidence(&problem, &fitted, draws, noise.child("evidence"));
-    let evidence = match stages.of(None, || evidence_by(&draws).map(Some))? {
-        Some(evidence) => evidence,
-        None => evidence_by(&PosteriorSample::default())?,
-    };
+    let evidence = weighed(&problem, (&fitted, &draws, without.as_ref()), stages, noise)?;
     let spread = FitIntervals::new(&problem, &fitted, &draws.thetas, settings.level);
     let (mut parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
     let arrived = arrived && certificate.has_converged();
@@ -70,7 +65,11 @@ pub(crate) fn run(
     let profiled = stages.of(<_>::default(), || {
         profiles(&problem, &fitted, (which, settings.level))
     })?;
-    let profiles = stated(&problem, profiled, &mut parameters);
+    let profiles = stated(&problem, without.as_ref(), profiled, &mut parameters);
+    if let Some(without) = without.as_ref().filter(|_| !problem.is_simulated()) {
+        let at = (&fitted, settings.level);
+        stages.of((), || without.reach_off(&problem, at, &mut parameters))?;
+    }
     let FollowedRecords {
         starts,
         free_runs,
@@ -90,17 +89,19 @@ pub(crate) fn run(
         agreeing: certificate.agreeing,
         searches: certificate.searches,
     };
-    let ends = without.is_none_or(|base| fitted.log_likelihood > base - BUDGET.below_without);
+    let alone = (without.as_ref()).map(|without| without.fitted.log_likelihood);
+    let ends = alone.is_none_or(|alone| fitted.log_likelihood > alone - BUDGET.below_without);
     convergence.converged &= ends;
     if !convergence.converged {
         parameters.iter_mut().for_each(FittedValue::withhold_error);
     }
     let mut doubts = Doubts::new(&problem, &fitted.theta);
     let by_step = doubts.steps(&free_runs);
-    doubts.below(without.filter(|_| !ends), fitted.log_likelihood);
+    doubts.below(alone.filter(|_| !ends), fitted.log_likelihood);
     doubts.search(&convergence, by_step);
     doubts.start(measured.elsewhere.as_ref());
-    doubts.bounds(&parameters, &noise_levels, &off);
+    doubts.bounds(&parameters, &noise_levels, without.as_ref());
+    doubts.effects(evidence.and_then(|evidence| evidence.gained));
     doubts.runs(&errors, by_step);
     doubts.swallowed(stages.of(None, || swallowed(&problem, &fitted, levels, &errors))?);
     doubts.rounded();
@@ -113,7 +114,7 @@ pub(crate) fn run(
         starts,
         level: settings.level,
         log_likelihood: fitted.log_likelihood,
-        evidence: evidence.map(FitEvidence::from),
+        evidence,
         convergence,
         errors,
         warnings: doubts.all,
@@ -129,6 +130,29 @@ pub(crate) fn run(
     }))
 }
 
+/// Evidence of a fit, and what its effects gain of it.
+fn weighed(
+    problem: &Problem,
+    (fitted, draws, without): (&Fitted, &PosteriorSample, Option<&WithoutEffects>),
+    stages: &mut FitStages,
+    noise: Noise,
+) -> Result<Option<FitEvidence>, FilterError> {
+    let by = |draws| evidence(problem, fitted, draws, noise.child("evidence"));
+    let found = match stages.of(None, || by(draws).map(Some))? {
+        Some(found) => found,
+        None => by(&PosteriorSample::default())?,
+    };
+    let gain = || match without.zip(found.as_ref()) {
+        Some((without, with)) => without.gain(problem, with, noise.child("without")),
+        None => Ok(None),
+    };
+    let gained = stages.of(None, gain)?;
+    Ok(found.map(|found| FitEvidence {
+        gained,
+        ..found.into()
+    }))
+}
+
 /// Returns what is told of the first states of the first record: value and standard error.
 fn told(starts: &[FittedStart]) -> impl Fn(&str) -> Option<(f64, f64)> {
     |state| {
@@ -137,19 +161,19 @@ fn told(starts: &[FittedStart]) -> impl Fn(&str) -> Option<(f64, f64)> {
     }
 }
 
-/// States intervals that hold both that of the posterior and that of the profile, for the named parameters; a side without an end reaches to the bound.
+/// States intervals that hold both that of the posterior and that of the profile, for the named parameters; a side without an end reaches to the bound,
+/// of a magnitude to where its law ends.
 fn stated(
     problem: &Problem,
+    without: Option<&WithoutEffects>,
     (profiles, named): (Vec<Profile>, BTreeSet<String>),
     parameters: &mut [FittedValue],
 ) -> Vec<Profile> {
     let space = problem.twin.parameters();
     for value in parameters.iter_mut().filter(|v| named.contains(&v.name)) {
         let own = profiles.iter().find(|profile| profile.name == value.name);
-        let bounds = space
-            .iter()
-            .find(|p| p.name == value.name)
-            .map(|p| p.bounds);
+        let law = without.and_then(|without| Some(without.magnitudes.get(&value.name)?.limits));
+        let bounds = law.or((space.iter().find(|p| p.name == value.name)).map(|p| p.bounds));
         if let Some((own, bounds)) = own.zip(bounds) {
             value.low = own.low.unwrap_or(bounds.low()).min(value.low);
             value.high = own.high.unwrap_or(bounds.high()).max(value.high);

@@ -6,6 +6,7 @@ use super::kinks::over_kinks;
 use super::problem::Problem;
 use super::starts::growing::base_fit;
 use super::starts::{polish, thorough};
+use crate::effect::Magnitude;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use std::collections::BTreeMap;
@@ -16,10 +17,18 @@ pub(crate) struct Searched {
     pub problem: Problem,
     /// Best first.
     pub fits: Vec<Fitted>,
-    /// Log-likelihood of the twin with all effects off; none without effects that are fitted.
-    pub without: Option<f64>,
-    /// Values of magnitudes, by name, at which their effects are off.
-    pub off: BTreeMap<String, f64>,
+    /// The twin without its effects; none where no effects are fitted.
+    pub without: Option<WithoutEffects>,
+}
+
+/// A twin whose fitted effects are off.
+#[derive(Clone)]
+pub(crate) struct WithoutEffects {
+    /// All magnitudes of its effects are held.
+    pub problem: Problem,
+    pub fitted: Fitted,
+    /// The fitted magnitudes, by name.
+    pub magnitudes: BTreeMap<String, Magnitude>,
 }
 
 impl Searched {
@@ -29,7 +38,6 @@ impl Searched {
             fits: fits(&problem, &[], noise)?,
             problem,
             without: None,
-            off: BTreeMap::new(),
         })
     }
 }

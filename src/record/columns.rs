@@ -1,6 +1,6 @@
 //! The columns of a file that hold the channels of a twin, or of none that is known.
 
-use super::channels::{Quantity, Signals, column_names, header, is_usual, usual_name};
+use super::channels::{self, Quantity, Signals, column_names, is_usual, usual_name};
 use crate::setting::did_you_mean;
 use crate::storage::untrusted::{excerpt, quoted};
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,19 @@ impl Columns {
     pub(crate) fn check(&self, signals: &Signals) -> Result<(), String> {
         let mut keys = self.0.keys();
         keys.try_for_each(|key| channel_of(key, Some(signals)).map(drop))
+    }
+
+    /// Header of a file that is read with these columns as a record of a twin: other columns have names that its reader tells apart.
+    pub(crate) fn header(&self, signals: &Signals) -> Vec<String> {
+        let given = |name: &str| {
+            let is_it = |key: &str| usual_name(key, Some(signals)).is_some_and(|own| own == name);
+            let found = self.0.iter().find(|(key, _)| is_it(key));
+            found.map(|(_, column)| column.clone())
+        };
+        let usual = channels::columns(signals.inputs.len(), signals.outputs.len());
+        (usual.iter().zip(channels::header(signals, true)))
+            .map(|(usual, own)| given(usual).unwrap_or(own))
+            .collect()
     }
 
     /// The same without those of outputs, for files of time and inputs.
@@ -312,7 +325,7 @@ fn ambiguous(header: &[&str], names: &[Option<String>], signals: &Signals) -> Op
             return Some(format!(
                 "column \"{0}\" is the name of an input and of an output; name the columns {1}",
                 quoted(column),
-                excerpt(&self::header(signals, true).join(", "))
+                excerpt(&channels::header(signals, true).join(", "))
             ));
         }
         let same = |(other, its): (&&str, &Option<String>)| its == name && other != column;
@@ -325,7 +338,7 @@ fn ambiguous(header: &[&str], names: &[Option<String>], signals: &Signals) -> Op
                 "columns \"{}\" and \"{}\" are one channel of the twin; name each by its own name, {}",
                 quoted(other),
                 quoted(column),
-                excerpt(&self::header(signals, true).join(", "))
+                excerpt(&channels::header(signals, true).join(", "))
             ));
         }
     }
@@ -448,7 +461,8 @@ mod tests {
             let inputs = Signal::from_shape_fn((3, signals.inputs.len()), |(k, j)| value(k, j));
             let outputs = Signal::from_shape_fn((3, signals.outputs.len()), |(k, j)| -value(k, j));
             let record = Record::new(Drive::new(0.5, inputs).unwrap(), outputs).unwrap();
-            record.write_for(&path, &signals).unwrap();
+            let names = Columns::default().header(&signals);
+            record.write_named(&path, &names).unwrap();
             std::fs::rename(&path, &moved).unwrap();
             let mut reader = RecordReader::new(Columns::default(), Some(signals.clone()));
             let read = reader.record(&moved).unwrap();

@@ -125,7 +125,10 @@ impl RecordReader {
 }
 
 fn table(path: &Path, wanted: Wanted<'_>, read: &mut usize) -> Result<Table, RecordError> {
-    if path.extension().is_some_and(|e| e == "parquet") {
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("parquet"))
+    {
         return parquet::with_rows(path, |rows| {
             Table::parse(Text::own(rows), path, wanted, read)
         });
@@ -150,9 +153,9 @@ pub(crate) fn record_csv_text(record: &Record) -> String {
     csv_text(&header, record.drive(), outputs)
 }
 
-/// As [`record_csv_text`], for a twin with these channels: its reader tells them apart.
-pub(crate) fn twin_csv_text(record: &Record, signals: &Signals) -> String {
-    csv_text(&header(signals, true), record.drive(), record.outputs())
+/// As [`record_csv_text`], with names of the columns: time, inputs, outputs.
+pub(crate) fn named_csv_text(record: &Record, names: &[String]) -> String {
+    csv_text(names, record.drive(), record.outputs())
 }
 
 fn csv_text(header: &[String], drive: &Drive, outputs: &Signal) -> String {
@@ -184,13 +187,8 @@ impl Record {
 
     /// As [`write`](Self::write), with names of the columns: time, inputs, outputs.
     pub(crate) fn write_named(&self, path: &Path, names: &[String]) -> Result<(), RecordError> {
-        let text = csv_text(names, self.drive(), self.outputs());
+        let text = named_csv_text(self, names);
         write_new(path, text.as_bytes()).map_err(|error| RecordError::io(path, error))
-    }
-
-    /// As [`write`](Self::write), for a twin with these channels: its reader tells them apart.
-    pub(crate) fn write_for(&self, path: &Path, signals: &Signals) -> Result<(), RecordError> {
-        self.write_named(path, &header(signals, true))
     }
 }
 

@@ -22,7 +22,7 @@ mod text;
 pub(crate) use channels::{LARGEST, column_names};
 pub use channels::{Quantity, Signals};
 pub(crate) use columns::Columns;
-pub(crate) use csv::{RecordReader, drive_csv_text, parse_record, record_csv_text, twin_csv_text};
+pub(crate) use csv::{RecordReader, drive_csv_text, named_csv_text, parse_record, record_csv_text};
 pub use drive::{Drive, Signal};
 pub(crate) use drive::{UNIFORM, check_size, check_sizes, on_line};
 pub use error::RecordError;

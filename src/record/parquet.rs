@@ -34,7 +34,8 @@ pub(super) fn with_rows<T>(
         let remedy = "a record has columns of numbers, snappy or not compressed";
         RecordError::file(path, format!("{error}; {remedy}"))
     };
-    let reader = SerializedFileReader::new(file.try_clone().map_err(unread)?).map_err(wrong)?;
+    let no_file = |_| RecordError::file(path, "no whole Parquet file; write it again");
+    let reader = SerializedFileReader::new(file.try_clone().map_err(unread)?).map_err(no_file)?;
     let schema = reader.metadata().file_metadata().schema_descr();
     let (mut names, mut units) = (vec![], vec![]);
     let durations = times::durations(reader.metadata().file_metadata());

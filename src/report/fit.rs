@@ -18,12 +18,12 @@ use serde_json::{Value, json};
 ///
 /// | key | holds |
 /// |---|---|
-/// | `parameters` | name, unit, value, standard error, interval, prior, bounds; `prior_share`: variance over the prior's; `at_bound`: `low`, `high` or null. Of a magnitude that the readings show the error is 0; of an end that is off, the value is null |
+/// | `parameters` | name, unit, value, standard error, interval (null where the search has not arrived, and an end that is none), prior, bounds; `prior_share`: variance over the prior's; `at_bound`: `low`, `high` or null. Of a magnitude that the readings show the error is 0; of an end that is off, the value is null |
 /// | `noise` | fitted levels: states in units per √s, outputs in their own, `y.share` the share of \|y\| that is added to that of `y`; `declared` is null where nothing was declared; `at_bound` as of parameters |
 /// | `starts` | states at the first sample of each record, given all of it |
 /// | `level` | level of the intervals |
 /// | `profiles` | profile likelihoods: name, unit, values, log-likelihoods below the highest, ends of the interval, null where a bound is inside |
-/// | `log_likelihood`, `evidence` | in nats; `evidence.std_error` is null where Laplace's approximation stands alone |
+/// | `log_likelihood`, `evidence` | in nats; `evidence.std_error` is null where Laplace's approximation stands alone, `evidence.gained`: over the twin without its fitted effects |
 /// | `convergence` | `converged`; `distance` to the top in standard deviations; `agreeing` of `searches` |
 /// | `errors` | of each output: root mean square of one-step and free-run errors, deviation of the record; `correlation` of one-step errors with the row before |
 /// | `warnings` | `code`, `what`, `remedy` |
@@ -284,7 +284,11 @@ fn quality(fit: &Fit) -> Vec<Block> {
             huge if huge.abs() >= 1e6 => short(huge),
             nats => format!("{nats:.2}"),
         };
-        search += &format!(" Log evidence {nats}{error} nats.");
+        let gained = evidence.gained.map_or(String::new(), |gained| {
+            let sign = if gained < 0.0 { "less" } else { "more" };
+            format!(", {} {sign} than without the effects", short(gained.abs()))
+        });
+        search += &format!(" Log evidence {nats}{error} nats{gained}.");
     }
     let steps = (fit.steps).map_or(String::new(), |taken| {
         format!(" The twin took {}.", taken.text())

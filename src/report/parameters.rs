@@ -124,14 +124,20 @@ impl ParameterRow {
     }
 }
 
-/// The ends of an interval, three digits each at most.
-fn range(interval: Interval) -> String {
-    let end = |value: f64| match value {
+/// An end of an interval, as `write` has it where it is a number.
+fn end(value: f64, write: impl FnOnce(f64) -> String) -> String {
+    match value {
         f64::INFINITY => "∞".to_owned(),
         f64::NEG_INFINITY => "−∞".to_owned(),
-        value => number(three_digits(value)).replace('-', "−"),
-    };
-    format!("{}…{}", end(interval.low()), end(interval.high()))
+        value => write(value),
+    }
+}
+
+/// The ends of an interval, three digits each at most.
+fn range(interval: Interval) -> String {
+    let [low, high] = [interval.low(), interval.high()]
+        .map(|value| end(value, |v| number(three_digits(v)).replace('-', "−")));
+    format!("{low}…{high}")
 }
 
 /// Values with errors and intervals of this level, in few columns.
@@ -147,7 +153,7 @@ pub(super) fn values(caption: &str, level: f64, rows: &[ParameterRow]) -> Block 
     ];
     let cells = |row: &ParameterRow| {
         let digits = Digits::supported(row.value, row.std_error);
-        let [low, high] = row.interval.map(|end| digits.write(end));
+        let [low, high] = row.interval.map(|value| end(value, |v| digits.write(v)));
         vec![
             row.label(),
             digits.write(row.value),

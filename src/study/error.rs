@@ -184,7 +184,7 @@ pub enum StudyError {
     Without(String),
     /// A simulation failed in a way that other parameters cannot mend.
     #[error(transparent)]
-    Simulation(#[from] SimulationError),
+    Simulation(SimulationError),
 }
 
 /// A record of several, as a message calls it.
@@ -192,6 +192,15 @@ fn name(record: Option<usize>) -> String {
     record.map_or("the validation record".into(), |index| {
         format!("record {}", index + 1)
     })
+}
+
+impl From<SimulationError> for StudyError {
+    fn from(error: SimulationError) -> Self {
+        match error.is_stopped() {
+            true => Self::Cancelled(Cancelled),
+            false => Self::Simulation(error),
+        }
+    }
 }
 
 impl From<FilterError> for StudyError {

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::Spanned;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 /// Longest study file, in bytes: a hundred times one that names every parameter and effect.
 const MOST: u64 = 1 << 20;
@@ -162,15 +162,17 @@ impl StudyFile {
         if text.len() as u64 > MOST {
             return Err(wrong(1, &format!("more than {} MiB of text", MOST >> 20)));
         }
+        let unread = |error: toml::de::Error| match error.span() {
+            Some(span) => wrong(line(text, span.start), error.message()),
+            None => wrong(line_of_depth(text), "a table or a list is nested too deep"),
+        };
+        let mut table = DeTable::parse(text).map_err(unread)?;
+        let keys = all_keys(table.get_ref());
         let syntax = |error: toml::de::Error| {
             let start = error.span().map_or(0, |span| span.start);
-            let line = line(text, start);
-            wrong(
-                line + lines_to_key(text, line, error.message()),
-                error.message(),
-            )
+            let start = key_within(text, &keys, start, error.message()).unwrap_or(start);
+            wrong(line(text, start), error.message())
         };
-        let mut table = DeTable::parse(text).map_err(syntax)?;
         let at = |(start, problem): (usize, String)| wrong(line(text, start), &problem);
         check_tables(table.get_ref()).map_err(at)?;
         check_shapes(table.get_ref()).map_err(at)?;
@@ -300,26 +302,56 @@ fn value_of(file: &Spanned<DeTable<'_>>, table: &str, name: &str) -> Option<usiz
     value.map(|value| value.span().start)
 }
 
-/// Returns how many lines below the line `first`, that of a table's header or of a key, the key stands that a message is about, of which the
-/// parser may tell the table alone: `k1: …` or ``… `blobs` …``, where also a value may stand so.
-fn lines_to_key(text: &str, first: usize, message: &str) -> usize {
+/// Returns the line of a text at which tables or lists are nested deeper than the parser goes.
+fn line_of_depth(text: &str) -> usize {
+    let ends: Vec<usize> = text.match_indices('\n').map(|(end, _)| end + 1).collect();
+    let is_too_deep = |to: usize| DeTable::parse(&text[..to]).is_err_and(|e| e.span().is_none());
+    ends.partition_point(|end| !is_too_deep(*end)) + 1
+}
+
+/// Returns all keys of tables within tables, by where they stand.
+fn all_keys(table: &DeTable<'_>) -> BTreeMap<usize, String> {
+    let mut keys = BTreeMap::new();
+    for (key, value) in table {
+        keys.insert(key.span().start, key.get_ref().to_string());
+        match value.get_ref() {
+            DeValue::Table(inner) => keys.extend(all_keys(inner)),
+            DeValue::Array(items) => {
+                let tables = items.iter().filter_map(|item| item.get_ref().as_table());
+                keys.extend(tables.flat_map(all_keys));
+            }
+            _ => {}
+        }
+    }
+    keys
+}
+
+/// Returns where the key stands that a message is about, of which the parser may tell the table alone, at `start`: `k1: …` or ``… `blobs` …``, where
+/// also a value may stand so.
+fn key_within(
+    text: &str,
+    keys: &BTreeMap<usize, String>,
+    start: usize,
+    message: &str,
+) -> Option<usize> {
     // Behind it are keys that would be right.
     let message = message.split(", expected").next().unwrap_or(message);
     let before_colon = message.split(": ").next().filter(|key| !key.contains(' '));
     let quoted = message.split('`').skip(1).step_by(2);
-    let lines = || text.lines().skip(first - 1).enumerate();
-    let below = |key: &str| {
-        let mut of_table = lines().take_while(|(i, line)| *i == 0 || !line.starts_with('['));
-        let is_key = |(_, line): &(usize, &str)| {
-            let (own, _) = line.split_once('=').unwrap_or_default();
-            let own = own.trim().trim_matches(['"', '\'']);
-            // A table may stand on the line of its key.
-            (key.strip_prefix(own)).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-        };
-        of_table.find(is_key).map(|(below, _)| below)
+    let first = text[..start].rfind('\n').map_or(0, |end| end + 1);
+    let end = text[start..]
+        .find("\n[")
+        .map_or(text.len(), |end| start + end);
+    // Names may be dotted.
+    let is_of = |told: &str, key: &str| {
+        let rest = told.strip_prefix(key);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     };
-    let mut told = before_colon.into_iter().chain(quoted);
-    told.find_map(below).unwrap_or(0)
+    let place = |told: &str| {
+        let mut own = keys.range(first..end);
+        own.find(|(_, key)| is_of(told, key)).map(|(at, _)| *at)
+    };
+    before_colon.into_iter().chain(quoted).find_map(place)
 }
 
 #[cfg(test)]

@@ -137,7 +137,8 @@ impl Study {
         let mut fit = fitted.ok_or_else(|| self.no_fit(records))?;
         fit.stepping = other.map(|other| other.stepping);
         (fit.warnings).extend(other.map(|other| Warning::hold(other.stepping, Some(other.gain))));
-        Ok((fit, measured.elsewhere.is_some()))
+        let given_up = measured.elsewhere.is_some_and(|start| !start.is_held);
+        Ok((fit, given_up))
     }
 
     /// Scores a fit of this study on a record that it has not seen: log density of its rows, one-step and free-run errors.

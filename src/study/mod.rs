@@ -26,7 +26,7 @@ use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern};
 use crate::equations::Declared;
 use crate::record::{Drive, Record, RecordError};
 use crate::setting::did_you_mean;
-use crate::twin::{DigitalTwin, Hold, Noise, Twin, check_twin};
+use crate::twin::{DeclaredNoise, DigitalTwin, Hold, Noise, NoiseLevel, Now, Twin, check_twin};
 use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
@@ -228,7 +228,43 @@ impl Study {
             return Some(text.to_owned());
         }
         let own = StudyFile::parse(text, Path::new(self.name())).ok()?;
-        self.file.upon(&own).written().ok()
+        let mut file = self.file.upon(&own);
+        self.noise_of_step(own.record.step?, &mut file);
+        file.written().ok()
+    }
+
+    /// Declares the process noise of the twin's code where it is another in a step of this file than in the `own` step of the twin's text, which has a
+    /// number for it.
+    fn noise_of_step(&self, own: f64, file: &mut StudyFile) {
+        let code = self
+            .base
+            .equations()
+            .filter(|_| file.noise.process.is_none());
+        let Some((twin, step)) = code.zip(file.record.step) else {
+            return;
+        };
+        let outline = twin.outline();
+        let theta = outline.parameters.centre();
+        let inputs = vec![0.0; outline.inputs.len()];
+        let (n, p) = (outline.states.len(), outline.outputs.len());
+        let levels = [own, step].map(|dt| {
+            let now = Now::new(0.0, dt, &inputs, &theta);
+            let (mut x, mut process) = (vec![0.0; n], vec![0.0; n]);
+            twin.start(&now, &mut x);
+            twin.noise(&now, &x, &mut process, &mut vec![0.0; p]);
+            process
+        });
+        for (i, state) in outline.states.iter().enumerate() {
+            let [at_own, level] = [levels[0][i], levels[1][i]];
+            if level != at_own {
+                let declared = NoiseLevel::Declared(DeclaredNoise {
+                    known: false,
+                    ..DeclaredNoise::known(level)
+                });
+                let levels = &mut file.noise.levels;
+                levels.entry(state.name.clone()).or_insert(declared);
+            }
+        }
     }
 
     /// Returns the study with a plan: its own, or that of the first of these records.
@@ -254,6 +290,12 @@ impl Study {
     /// Returns whether estimates may lean on the prior: `[prior] trust = true`.
     pub(crate) fn trusts_prior(&self) -> bool {
         self.file.prior.trust
+    }
+
+    /// Returns whether the file of the study adds this effect.
+    pub(crate) fn has_effect(&self, key: &EffectKey) -> bool {
+        let mut own = self.file.effect.iter();
+        own.any(|own| own.id == key.id && own.target == key.target)
     }
 
     /// Returns whether a pattern names an effect of the library or of the study's own.

@@ -339,7 +339,10 @@ fn check_table(name: &str, table: &DeTable<'_>) -> Result<(), (usize, String)> {
             DeValue::Datetime(_) if matches!(name, "record" | "input") => {
                 "is no date; write a number, or a text in quotes"
             }
-            value if name == "prior" && key == TRUST && !value.is_bool() => "is true or false",
+            // A parameter may have that name, too.
+            value if name == "prior" && key == TRUST && !(value.is_bool() || value.is_array()) => {
+                "is true or false"
+            }
             DeValue::Array(ends) if keeps_intervals && ends.len() != 2 => {
                 "has two ends: write [low, high]"
             }

@@ -1,5 +1,6 @@
 //! Errors of a twin's parameters, names, settings and effects, and of its simulations.
 
+use crate::progress::Cancelled;
 use crate::setting::{count, did_you_mean, number};
 use std::path::PathBuf;
 
@@ -156,6 +157,15 @@ impl SimulationError {
     /// A fatal error from an error.
     pub(crate) fn of(error: impl std::error::Error + Send + Sync + 'static) -> Self {
         Self::Fatal(error.into())
+    }
+
+    /// A run that is given up as the work is to stop.
+    pub(crate) fn stopped() -> Self {
+        Self::Fatal(Cancelled.into())
+    }
+
+    pub(crate) fn is_stopped(&self) -> bool {
+        matches!(self, Self::Fatal(inner) if inner.is::<Cancelled>())
     }
 
     /// Tells whether only this run is lost: a search goes on elsewhere, a draw is drawn again.

@@ -278,6 +278,8 @@ fn a_free_ceiling_is_found_and_nested_fits_are_never_worse() {
     assert!(both.log_likelihood > free.log_likelihood - 0.5, "{all:?}");
     let level = value(&free, "state-ceiling@h1.level");
     assert!((level - 6.0).abs() < 1.0, "{level}");
+    let gained = free.evidence.and_then(|evidence| evidence.gained);
+    assert!(gained.is_some_and(|gained| gained > 15.0), "{gained:?}");
     // Readings that pile up nowhere know no end of a range: not the least and the greatest of them either.
     let range = fit("[[effect]]\nid = 'sensor-saturation'\ntarget = 'sensor'\n");
     assert!(
@@ -285,6 +287,35 @@ fn a_free_ceiling_is_found_and_nested_fits_are_never_worse() {
         "{}",
         range.log_likelihood
     );
+}
+
+/// Effects that a record does not ask for gain no evidence, and their intervals hold where they are off: 0, or for a ceiling without end.
+#[test]
+fn effects_that_a_record_does_not_ask_for_are_told() {
+    let study = with_effects("");
+    let noise = Noise::new(5, "complete", 0);
+    let drive = study.drive(noise).unwrap();
+    let outputs = study.twin().simulate(&TRUTH, &drive, noise).unwrap();
+    let records = [Record::new(drive, outputs).unwrap()];
+    for (effect, magnitude, off) in [
+        (CEILING, "state-ceiling@h1.level", f64::INFINITY),
+        (DRAG, "power-law@h2.coefficient", 0.0),
+        (
+            "[[effect]]\nid = 'sensor-backlash'\ntarget = 'sensor'\n",
+            "sensor-backlash@sensor.width",
+            0.0,
+        ),
+    ] {
+        let fit = fitted(&with_effects(effect), &records);
+        let gained = fit.evidence.unwrap().gained.unwrap();
+        let own = fit.parameters.iter().find(|p| p.name == magnitude).unwrap();
+        println!("{magnitude}: {gained} {own:?} {:?}", fit.warnings);
+        assert!((-8.0..0.2).contains(&gained), "{magnitude}: {gained}");
+        assert!(own.low <= off && own.high >= off, "{own:?}");
+        let told = ["not-asked", "at-bound"];
+        let is_told = (fit.warnings.iter()).any(|w| told.contains(&w.code));
+        assert!(is_told || gained >= 0.0, "{magnitude}: {:?}", fit.warnings);
+    }
 }
 
 /// Three seeds move the evidence of a real twin by a tenth of a nat at most. Draws whose error is 0.1 nat spread by more with a probability of

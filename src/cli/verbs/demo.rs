@@ -4,7 +4,7 @@ use super::estimate::Answer;
 use crate::cli::prelude::*;
 use crate::cli::shell_word::shown;
 use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
-use crate::record::{Record, twin_csv_text};
+use crate::record::{Columns, Record, named_csv_text};
 use crate::twin::Noise;
 
 /// A small bank and few epochs keep the demo short; the refinement corrects the rough network.
@@ -73,7 +73,7 @@ impl Verb for Demo {
             };
             folder.write(
                 "record.csv",
-                twin_csv_text(&record, &study.twin().signals()),
+                named_csv_text(&record, &Columns::default().header(&study.twin().signals())),
             )?;
             answer.write(&folder, &provenance)?;
             folder.finish()?;

@@ -2,7 +2,7 @@
 
 use crate::cli::prelude::*;
 use crate::effect::{Effect, augment};
-use crate::record::{Drive, Record, twin_csv_text};
+use crate::record::{Drive, Record, Signal, named_csv_text};
 use crate::setting::{count, did_you_mean};
 use crate::twin::{Noise, Parameter, ParameterSpace, Role, Twin};
 use std::collections::BTreeMap;
@@ -53,6 +53,13 @@ impl Verb for Simulate {
         };
         if let Some(path) = &self.effect {
             let effects = study.catalogue().read(path, drive.dt())?;
+            let is_own = |effect: &&Effect| study.has_effect(effect.key());
+            if let Some(effect) = effects.iter().find(is_own) {
+                let (file, key) = (path.display(), effect.key());
+                return Err(Failure::user(format!(
+                    "{file}: the study has {key} already; give it in one of the two"
+                )));
+            }
             magnitudes.extend(effects.iter().flat_map(Effect::given_by_parameter));
             twin = augment(twin, effects).in_file(path)?;
         }
@@ -71,22 +78,28 @@ impl Verb for Simulate {
         let record = Record::complete(drive, outputs)?;
         let signals = twin.signals();
         record.check_channels(&signals)?;
+        let names = study.file().record.columns.header(&signals);
         if let Some(out) = &self.out {
             write_result(out, |path| {
-                Ok::<_, Failure>(record.write_for(path, &signals)?)
+                Ok::<_, Failure>(record.write_named(path, &names)?)
             })?;
         }
-        let rows = || record.outputs().rows().into_iter().map(|row| row.to_vec());
+        let rows = |of: &Signal| -> Option<Vec<Vec<f64>>> {
+            let rows = of.rows().into_iter().map(|row| row.to_vec());
+            self.out.is_none().then(|| rows.collect())
+        };
+        let times = || (0..record.samples()).map(|k| record.drive().own_time(k));
         let json = json!({
             "schema": "truetwin.simulate/1", "twin": study.name(),
             "names": twin.parameters().names(), "theta": theta,
             "seed": context.seed, "noise_free": self.noise_free,
             "samples": record.samples(), "step": record.drive().dt(), "record": self.out.as_deref().map(output::name),
-            "y": self.out.is_none().then(|| rows().collect::<Vec<_>>()),
+            "t": self.out.is_none().then(|| times().collect::<Vec<_>>()),
+            "u": rows(record.drive().inputs()), "y": rows(record.outputs()),
         });
         let text = || match &self.out {
             Some(_) => String::new(),
-            None => twin_csv_text(&record, &signals),
+            None => named_csv_text(&record, &names),
         };
         Provenance::new(context)
             .files("input", &self.input)
@@ -152,8 +165,19 @@ fn complete(
             did_you_mean(name, &names),
         )));
     }
+    let missing = || -> Vec<&str> {
+        let needed = (space.iter()).filter(|p| !matches!(p.role, Role::Start | Role::Noise));
+        let names = needed.map(|p| p.name.as_str());
+        names
+            .filter(|name| !given.contains_key(*name) && !magnitudes.contains_key(*name))
+            .collect()
+    };
     let value = |p: &Parameter| match (given.get(&p.name), magnitudes.get(&p.name), p.role) {
-        (Some(value), _, _) => match p.check_value(*value) {
+        (Some(_), Some(_), _) => Err(wrong_theta(format!(
+            ": the effect file gives {} already; give it in one of the two",
+            p.name
+        ))),
+        (Some(value), None, _) => match p.check_value(*value) {
             Ok(()) => Ok(*value),
             Err(error) => Err(wrong_theta(format!(": {error}"))),
         },
@@ -161,8 +185,9 @@ fn complete(
         (None, Some(magnitude), _) => Ok(*magnitude),
         (None, None, Role::Start | Role::Noise) => Ok(p.prior.centre()),
         (None, None, _) => Err(wrong_theta(format!(
-            ": no value for {}; give {all}",
-            p.name
+            ": no value for {}; give {}",
+            p.name,
+            missing().join(", ")
         ))),
     };
     space.iter().map(value).collect()

@@ -4,6 +4,7 @@ use super::description::Description;
 use super::health::Health;
 use super::pool::{Pool, ProgramRequest};
 use super::worker::Trouble;
+use crate::progress::is_hastened;
 use crate::twin::SimulationError;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -94,6 +95,10 @@ impl Asker {
         };
         let mut attempt = 0;
         loop {
+            // A copy that was ended as the work is to stop is no failure.
+            if is_hastened() {
+                return Err(Unanswered::Broken(SimulationError::stopped()));
+            }
             attempt += 1;
             let fresh = attempt > 1;
             match (self.pool).ask(request, fresh, &self.description, read) {
@@ -105,6 +110,7 @@ impl Asker {
                 Err(Trouble::Gone(_)) if attempt < attempts => {
                     self.health.check().map_err(Unanswered::Broken)?;
                 }
+                Err(Trouble::Gone(_)) if is_hastened() => {}
                 Err(Trouble::Gone(copy)) => {
                     return Err(Unanswered::Gone(self.named(&copy.text(attempt))));
                 }

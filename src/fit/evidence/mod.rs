@@ -47,6 +47,16 @@ pub(super) struct Evidence {
     pub effective: f64,
 }
 
+impl Evidence {
+    /// Nats over another, both as draws correct them or both by Laplace alone.
+    pub fn over(&self, other: &Self) -> f64 {
+        match self.error.and(other.error) {
+            Some(_) => self.log_evidence - other.log_evidence,
+            None => self.laplace - other.laplace,
+        }
+    }
+}
+
 /// Evidence by Laplace alone: averaged over all sizes, and the approximation at the most probable ones. `credit` bounds what an
 /// unfinished fit is credited with.
 pub(crate) fn laplace(problem: &Problem, fitted: &Fitted, credit: f64) -> Option<(f64, Laplace)> {

@@ -53,10 +53,17 @@ impl PosteriorRegion {
             ),
         };
         for (j, p) in space.iter().take(own).enumerate() {
-            if p.role != Role::Start || !problem.axes[j].held {
+            if !problem.axes[j].held {
                 continue;
             }
-            if let Some((value, deviation)) = start(p.target()) {
+            let value = fitted.theta[j];
+            if p.role == Role::Magnitude && (value <= p.bounds.low() || value >= p.bounds.high()) {
+                // What is off without end is so as far as the prior goes: features see no farther.
+                mean[j] = p.prior.clamp(value) / widths[j];
+            }
+            if p.role == Role::Start
+                && let Some((value, deviation)) = start(p.target())
+            {
                 mean[j] = p.bounds.clamp(value) / widths[j];
                 covariance[(j, j)] = (deviation / widths[j]).powi(2);
             }

@@ -280,8 +280,11 @@ impl Round {
         )?;
         let sum: f64 = weights.iter().sum();
         let own: Vec<_> = own.iter().map(|(x, _)| *x).zip(&weights).collect();
-        let zeros = DVector::zeros(own.first()?.0.len());
-        let mean = (own.iter()).fold(zeros, |m, (x, w)| m + *x * (**w / sum));
+        // What may not move stays to the bit: a mean of equal values would round a value at its bound to one beyond.
+        let mut mean = own.first()?.0.clone();
+        for &j in &self.free {
+            mean[j] = own.iter().map(|(x, w)| x[j] * *w / sum).sum();
+        }
         let spread = own.iter().fold(DMatrix::zeros(d, d), |c, (x, w)| {
             let off = (*x - &mean).select_rows(&self.free);
             c + &off * off.transpose() * (**w / sum)

@@ -62,10 +62,15 @@ pub(in crate::fit) fn table(
 ) -> Result<Posterior, FilterError> {
     let space = problem.twin.parameters();
     let d = space.len();
-    // Unknown starts of equations are integrated, and stand below.
+    // Unknown starts of equations are integrated, and stand below; an end of a range that is off has no value.
+    let is_off = |j: usize| {
+        let bounds = space[j].bounds;
+        let at = draws.thetas.first().map_or(0.0, |theta| theta[j]);
+        space[j].role == Role::Magnitude && (at <= bounds.low() || at >= bounds.high())
+    };
     let own: Vec<usize> = (0..problem.dimension())
         .filter(|&j| j >= d || space[j].role != Role::Start || !problem.axes[j].held)
-        .filter(|&j| !problem.axes[j].held || j < d)
+        .filter(|&j| !problem.axes[j].held || (j < d && !is_off(j)))
         .collect();
     let mut names: Vec<String> = own.iter().map(|&j| problem.name(j)).collect();
     let states: Vec<usize> = match problem.is_simulated() {

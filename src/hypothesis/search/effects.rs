@@ -3,10 +3,10 @@
 use super::frequencies::frequencies;
 use super::model::Model;
 use super::{Before, Breadth, listed};
-use crate::effect::Effect;
+use crate::effect::{Effect, Magnitude};
 use crate::fit::axis::Axis;
 use crate::fit::problem::Problem;
-use crate::fit::{Passes, Searched, fits};
+use crate::fit::{Passes, Searched, WithoutEffects, fits};
 use crate::hypothesis::limits::{SEARCH, TERM};
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
@@ -36,25 +36,28 @@ pub(crate) fn searched(
     let base = fits(&off, &[], noise)?.into_iter().next();
     let model = base
         .clone()
-        .and_then(|base| Model::bare(measured.twin.clone(), off, base, false));
+        .and_then(|base| Model::bare(measured.twin.clone(), off.clone(), base, false));
     let Some((base, model)) = base.zip(model) else {
         return Searched::alone(plain, noise);
     };
     let terms = shared(own_terms(&model, effects)?);
-    let (problem, ends) = opened(&model, &terms);
-    let mut without = model.fitted.theta.clone();
-    for (j, value) in without.iter_mut().enumerate().take(space.len()) {
-        *value = ends.get(&space[j].name).copied().unwrap_or(*value);
+    let (problem, magnitudes) = opened(&model, &terms);
+    let mut all_off = model.fitted.theta.clone();
+    for (j, value) in all_off.iter_mut().enumerate().take(space.len()) {
+        *value = (magnitudes.get(&space[j].name).and_then(|m| m.off)).unwrap_or(*value);
     }
     let initial: Vec<Vec<f64>> = (grown(model, terms, noise)?.into_iter())
-        .chain([without])
+        .chain([all_off])
         .map(|theta| problem.clamp(&theta))
         .collect();
     Ok(Searched {
         fits: fits(&problem, &initial, noise)?,
         problem,
-        without: Some(base.log_likelihood),
-        off: ends,
+        without: Some(WithoutEffects {
+            problem: off,
+            fitted: base,
+            magnitudes,
+        }),
     })
 }
 
@@ -95,26 +98,24 @@ fn own_terms(model: &Model, effects: &[Effect]) -> Result<Vec<Term>, FilterError
     terms.filter_map(Result::transpose).collect()
 }
 
-/// The problem with all magnitudes free, and where each effect is off in it.
-fn opened(model: &Model, terms: &[Arc<Term>]) -> (Problem, BTreeMap<String, f64>) {
-    let mut off = BTreeMap::new();
+/// The problem with all magnitudes free, and those of them that readings do not show.
+fn opened(model: &Model, terms: &[Arc<Term>]) -> (Problem, BTreeMap<String, Magnitude>) {
+    let mut free = BTreeMap::new();
     let problem = with_axes(&model.problem, |axes, space| {
         for term in terms {
             let Part::Effect { effect, .. } = &term.part else {
                 continue;
             };
-            let ends: BTreeMap<String, f64> = effect.off().collect();
             let entries = term.entries.iter().flatten();
             for (&j, axis) in entries.zip(&term.axes) {
                 axes[j] = axis.clone();
-                // What readings show is not off anywhere.
-                if let Some(end) = ends.get(&space[j].name).filter(|_| !axis.held) {
-                    off.insert(space[j].name.clone(), axis.bounds.clamp(*end));
-                }
             }
+            let is_free = |name: &String| space.position(name).is_ok_and(|j| !axes[j].held);
+            let named = (effect.named_magnitudes()).map(|(name, m)| (name, m.clone()));
+            free.extend(named.filter(|(name, _)| is_free(name)));
         }
     });
-    (problem, off)
+    (problem, free)
 }
 
 /// Ends of fits with one effect more at a time, as long as one can be fitted, the last one first; beside each of them, those with another

@@ -78,6 +78,7 @@ impl FilterError {
 fn stops(error: &(dyn std::error::Error + 'static)) -> bool {
     let inner = match (error.downcast_ref(), error.downcast_ref()) {
         (Some(FilterError::Cancelled(_)), _) => return true,
+        (Some(FilterError::Simulation(error)), _) => return error.is_stopped(),
         (Some(FilterError::Difference(MathError::Fatal(inner))), _)
         | (_, Some(MathError::Fatal(inner))) => Some(&**inner),
         _ => None,

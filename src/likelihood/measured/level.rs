@@ -77,8 +77,10 @@ pub(crate) struct StartElsewhere {
     pub value: f64,
     /// The value nearest to it that the start allows.
     pub expected: f64,
-    /// States whose start is then unknown.
+    /// States whose start is then unknown, or that is declared and stands.
     pub states: Vec<String>,
+    /// `true` where it stands.
+    pub is_held: bool,
 }
 
 /// Sizes of what a record shows, from which levels are guessed.

@@ -39,15 +39,11 @@ pub(super) struct Starts {
 
 impl Starts {
     pub fn of(twin: &Composed, records: &[Record], beliefs: &Beliefs, theta: &[f64]) -> Self {
-        let space = twin.outline().parameters;
-        let theta: Vec<f64> = (space.iter().zip(theta))
-            .map(|(p, value)| p.bounds.clamp(*beliefs.off.get(&p.name).unwrap_or(value)))
-            .collect();
         let names: Vec<String> = (twin.outline().states.into_iter())
             .map(|state| state.name)
             .collect();
         let drive = records[0].drive();
-        let now = Now::new(drive.first_time(), drive.dt(), drive.input(0), &theta);
+        let now = Now::new(drive.first_time(), drive.dt(), drive.input(0), theta);
         let written = twin.written_starts(&now);
         let is_declared = |name: &String| beliefs.starts.contains(name);
         let mut unknown: Vec<bool> = (names.iter().zip(&written))
@@ -60,36 +56,55 @@ impl Starts {
         for (r, record) in (records.iter().enumerate()).filter(|_| !beliefs.trusts_code) {
             // Of records that begin at 0, the study's own word stands; at another time, it may be that of a start before the record.
             let stands = record.drive().first_time() == 0.0 || twin.begins().is_some();
-            let given_up: Vec<usize> = (0..names.len())
-                .filter(|&i| !unknown[i] && !is_memory(&names[i]))
-                .filter(|&i| {
-                    !(is_declared(&names[i]) && (stands || beliefs.wide.contains(&names[i])))
-                })
-                .collect();
-            let Some((output, value, expected)) =
-                contradiction((twin, &unknown), record, &theta).filter(|_| !given_up.is_empty())
-            else {
+            let Some(found) = contradiction((twin, &unknown), record, theta) else {
                 continue;
             };
-            given_up.iter().for_each(|&i| unknown[i] = true);
-            elsewhere.get_or_insert(StartElsewhere {
-                record: r,
-                output: twin.outline().outputs[output].clone(),
-                value,
-                expected,
-                states: given_up.iter().map(|&i| names[i].clone()).collect(),
-            });
+            let (held, given_up): (Vec<usize>, Vec<usize>) = (0..names.len())
+                .filter(|&i| !unknown[i] && !is_memory(&names[i]))
+                .partition(|&i| {
+                    is_declared(&names[i]) && (stands || beliefs.wide.contains(&names[i]))
+                });
+            // States that the output does not show are not to blame.
+            let is_shown = |i: &&usize| found.shows[**i];
+            let is_held = !given_up.iter().any(|i| is_shown(&i));
+            let states: Vec<usize> = match is_held {
+                true => held.iter().filter(is_shown).copied().collect(),
+                false => given_up,
+            };
+            if !is_held {
+                states.iter().for_each(|&i| unknown[i] = true);
+            }
+            let is_news = |last: &StartElsewhere| last.is_held && !is_held;
+            if !states.is_empty() && elsewhere.as_ref().is_none_or(is_news) {
+                elsewhere = Some(StartElsewhere {
+                    record: r,
+                    output: twin.outline().outputs[found.output].clone(),
+                    value: found.value,
+                    expected: found.expected,
+                    states: states.iter().map(|&i| names[i].clone()).collect(),
+                    is_held,
+                });
+            }
         }
         Self { unknown, elsewhere }
     }
 }
 
-/// Output whose value in the first row no θ within the bounds starts at, the value, and the nearest one that is possible.
+/// A value in the first row at which no θ within the bounds starts.
+struct Contradiction {
+    output: usize,
+    value: f64,
+    /// The nearest one that is possible.
+    expected: f64,
+    /// States that the output shows.
+    shows: Vec<bool>,
+}
+
 fn contradiction(
     (twin, unknown): (&Composed, &[bool]),
     record: &Record,
     theta: &[f64],
-) -> Option<(usize, f64, f64)> {
+) -> Option<Contradiction> {
     let outline = twin.outline();
     let (n, p) = (outline.states.len(), outline.outputs.len());
     if twin.begins().is_some() {
@@ -98,6 +113,7 @@ fn contradiction(
     }
     let mut range = vec![(f64::INFINITY, f64::NEG_INFINITY); p];
     let mut noise = vec![0.0; p];
+    let mut shows = vec![vec![false; n]; p];
     let mut look = |theta: &[f64]| {
         // A twin that does not work there says nothing.
         let Ok(acting) = Acting::of(twin, theta, record.drive()) else {
@@ -117,19 +133,22 @@ fn contradiction(
             noise[j] = f64::max(noise[j], r[j]);
         }
         for i in 0..n {
-            // An unknown state may be anywhere.
-            let reach = if unknown[i] {
-                1.0
-            } else {
-                MEASURED.elsewhere * std[i]
-            };
-            for reach in [reach, -reach].into_iter().filter(|reach| *reach != 0.0) {
+            let read = |reach: f64| {
                 let (mut moved, mut there) = (x.clone(), vec![0.0; p]);
                 moved[i] += reach;
                 twin.observe(&now, &moved, &mut there);
                 twin.readout(&now, &mut there);
+                there
+            };
+            let reach = MEASURED.elsewhere * std[i];
+            for (reach, is_likely) in [(reach, true), (-reach, true), (1.0, false), (-1.0, false)] {
+                let there = read(reach);
                 for j in 0..p {
-                    range[j] = (range[j].0.min(there[j]), range[j].1.max(there[j]));
+                    if is_likely {
+                        range[j] = (range[j].0.min(there[j]), range[j].1.max(there[j]));
+                    }
+                    shows[j][i] |= there[j] != y[j];
+                    // An unknown state may be anywhere.
                     if unknown[i] && there[j] != y[j] {
                         noise[j] = f64::INFINITY;
                     }
@@ -162,7 +181,12 @@ fn contradiction(
                     .max(roughness(&values))
                     .max(record.cells()[j].sqrt());
             if (value - expected).abs() > reach {
-                return Some((j, value, expected));
+                return Some(Contradiction {
+                    output: j,
+                    value,
+                    expected,
+                    shows: shows.swap_remove(j),
+                });
             }
         }
     }

@@ -226,7 +226,7 @@ fn tracking(study: &Study, estimate: &Estimate) -> String {
 /// | key | holds |
 /// |---|---|
 /// | `names`, `theta`, `std_error`, `interval` | the twin's own parameters, in one order, in their units |
-/// | `nuisance` | start states, noise levels and magnitudes of effects, estimated beside them |
+/// | `nuisance` | start states, noise levels and magnitudes of effects, estimated beside them, `low` and `high` of their intervals |
 /// | `gate`, `after` | the test at the network's estimate, and at the refitted one; `after` is null without a refit, its values are null where the refit left no degree of freedom. `p_error`: Monte-Carlo error of `p_value`; `simulations`: those that the record is ranked among; `at_floor`: none of them is as far, so that p is below `p_value` |
 /// | `weak_directions` | unit vectors in θ over the prior's width that the prior knows better than the record |
 /// | `free_run` | root mean square of record − noise-free run, in output units |
@@ -264,6 +264,15 @@ pub(super) fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
         .flat_map(|known| known.weak())
         .collect();
     let trusting = &estimate.initial;
+    let beside = (0..estimate.names.len()).filter(|&j| estimate.roles[j] != Role::Parameter);
+    let nuisance: Vec<Value> = (estimate.nuisance().into_iter().zip(beside))
+        .map(|(own, j)| {
+            let mut line = json!(own);
+            line["low"] = json!(estimate.low[j]);
+            line["high"] = json!(estimate.high[j]);
+            line
+        })
+        .collect();
     let seconds = estimate.seconds;
     json!({
         "schema": "truetwin.estimate/1",
@@ -277,7 +286,7 @@ pub(super) fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
             "final": own(&estimate.theta),
         },
         "std_error": own(&estimate.std_error),
-        "nuisance": estimate.nuisance(),
+        "nuisance": nuisance,
         "interval": {
             "level": INTERVAL_LEVEL,
             "low": own(&estimate.low),

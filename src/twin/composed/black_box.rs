@@ -4,6 +4,7 @@ use super::digital_twin::mean_run;
 use super::part::{Disturbance, Entry, LARGEST, Law, LawPart, ParameterChange, TwinPart};
 use super::parts::{Added, Parts, Theta};
 use super::simulation::check_length;
+use crate::progress::is_hastened;
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
     DigitalTwin, Integrator, KnownNoise, Noise, NoisePart, Now, Outline, ParameterSpace,
@@ -260,6 +261,9 @@ impl DigitalTwin for ComposedBlackBox {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
+        if is_hastened() {
+            return Err(SimulationError::stopped());
+        }
         self.parts.call_hooks()?;
         let theta = self.checked(theta, drive.dt())?;
         let mut outputs = self.outputs(&self.parts.list, &theta, drive, noise)?;

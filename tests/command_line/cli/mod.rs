@@ -337,7 +337,7 @@ fn wrong_calls_are_refused_with_the_remedy() {
     );
     refused(
         &["simulate", "--twin", "tanks", "--theta", "k1=0.6"],
-        &["no value for k2", "k1, k2, k3, k4"],
+        &["no value for k2; give k2, k3, k4"],
     );
     refused(
         &["simulate", "--twin", "tanks", "--theta", "k9=0.6"],
