@@ -70,14 +70,20 @@ def test_frames_dicts_and_files_are_the_same_record(twin, record, csv):
     assert several.raw["samples"] == 200 and len(several.report.pictures) == 2
 
 
-def test_columns_have_other_names(twin, record, tmp_path):
+def test_columns_have_other_names(twin, record, tmp_path, monkeypatch):
     frame = pd.DataFrame({"time": record["t"], "power, W": record["power"], "T": record["temperature"], "x": "text"})
-    with pytest.raises(ValueError, match="holds a comma"):
-        twin.fit(frame, columns={"t": "time", "u": "power, W", "y": "T"})
-    frame = frame.rename(columns={"power, W": "W"})
-    columns = {"t": "time", "power": "W", "temperature": "T"}
+    with pytest.raises(ValueError, match="give the name of a column"):
+        twin.fit(frame, columns={"t": "time", "u": "", "y": "T"})
+    with pytest.raises(ValueError, match="pass at least one"):
+        twin.fit([])
+    frame = frame.rename(columns={"T": 'T "in"'})
+    columns = {"t": "time", "power": "power, W", "temperature": 'T "in"'}
     frame.to_csv(tmp_path / "log.csv", index=False)
-    assert twin.fit(frame, columns=columns).parameters == twin.fit(tmp_path / "log.csv", columns=columns).parameters
+    fitted = twin.fit(tmp_path / "log.csv", columns=columns).parameters
+    assert twin.fit(frame, columns=columns).parameters == fitted
+    frame.to_csv(tmp_path / "-e.csv", index=False)
+    monkeypatch.chdir(tmp_path)
+    assert twin.fit("-e.csv", columns=columns).parameters == fitted
 
 
 def test_missing_outputs_are_skipped(twin, record):

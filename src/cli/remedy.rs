@@ -107,7 +107,7 @@ impl Remedy for RecordError {
                 number(*expected)
             ),
             Self::Start(_) => "`at` of [start] in the study file, or of a state's start".into(),
-            Self::OneStep => "`truetwin resample R.csv --step S --out R2.csv`".into(),
+            Self::OneStep { .. } => "`truetwin resample R.csv --step S --out R2.csv`".into(),
             Self::Channels { .. } => "`truetwin twins` lists the twins".into(),
             Self::Columns { .. } => {
                 "--columns t=NAME,u=NAME,y=NAME, or [record] columns of a study file, takes other names".into()

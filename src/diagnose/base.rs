@@ -13,6 +13,7 @@ use crate::fit::{ITERATIONS, Passes};
 use crate::hypothesis::listed::Library;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::search::SEARCH;
+use crate::hypothesis::search::effects::searched;
 use crate::hypothesis::search::frequencies::frequencies;
 use crate::hypothesis::search::model::Model;
 use crate::hypothesis::shared;
@@ -72,7 +73,14 @@ impl Base {
         let problem = Problem::of_measured(&measured, records.clone()).counted_with(passes);
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
-        let fitted = if !problem.is_simulated() {
+        let has_effects = space.iter().any(|p| p.role == Role::Magnitude);
+        let fitted = if has_effects && initial.is_none() && !problem.is_simulated() {
+            // As a fit of the study has them: the same starts, and the same ends of ranges that readings show.
+            let effects = study.added_effects()?;
+            let searched = searched(&measured, &effects, records, starts, passes)?;
+            let best = searched.fits.into_iter().next();
+            best.map(|fitted| (searched.problem, fitted))
+        } else if !problem.is_simulated() {
             let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
             let found = thorough(&problem, &initial, starts)?;
             found.into_iter().next().map(|fitted| (problem, fitted))

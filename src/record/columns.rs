@@ -284,10 +284,15 @@ impl FromStr for Columns {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let mut columns = BTreeMap::new();
-        let mut is_quoted = false;
+        // A name that begins with a quote ends with one, and has two for each of its own.
+        let (mut before, mut has_quotes, mut is_quoted) = (',', false, false);
         let between = |c: char| {
-            is_quoted ^= c == '"';
-            c == ',' && !is_quoted
+            has_quotes |= c == '"' && before == '=';
+            is_quoted ^= c == '"' && has_quotes;
+            let ends = c == ',' && !is_quoted;
+            has_quotes &= !ends;
+            before = if c.is_whitespace() { before } else { c };
+            ends
         };
         for part in text.split(between) {
             let (key, column) = (part.split_once('='))
@@ -308,11 +313,11 @@ impl FromStr for Columns {
 }
 
 /// The name between quotes.
-fn unquoted(name: &str) -> &str {
+fn unquoted(name: &str) -> String {
     let inner = name
         .strip_prefix('"')
         .and_then(|name| name.strip_suffix('"'));
-    inner.unwrap_or(name)
+    inner.map_or(name.to_owned(), |inner| inner.replace("\"\"", "\""))
 }
 
 /// Returns the two columns of a header that are one channel of the twin, under different names; or one that is two channels.
@@ -448,7 +453,7 @@ mod tests {
                 outputs: drawn(1 + trial % 5),
             };
             for outputs in [true, false] {
-                let written = header(&signals, outputs);
+                let written = channels::header(&signals, outputs);
                 let shown = if outputs { signals.outputs.len() } else { 0 };
                 let expected = channels::columns(signals.inputs.len(), shown);
                 own += usize::from(written != expected);

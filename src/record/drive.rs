@@ -1,5 +1,6 @@
 //! The time grid and the inputs of one experiment.
 
+use crate::math::six_digits;
 use crate::record::RecordError;
 use ndarray::{Array1, Array2, ArrayView1, s};
 use std::sync::Arc;
@@ -195,10 +196,14 @@ impl Drive {
 
     /// Checks that all steps are the same, as a twin needs it that is told one step.
     pub(crate) fn check_uniform(&self) -> Result<(), RecordError> {
-        match self.is_uniform() {
-            true => Ok(()),
-            false => Err(RecordError::OneStep),
-        }
+        self.oddest_step().map_or(Ok(()), |k| {
+            Err(RecordError::OneStep {
+                row: self.rows.line(k + 1),
+                column: self.rows.column(0, || "t".into()),
+                given: six_digits(self.step(k)),
+                expected: six_digits(self.dt),
+            })
+        })
     }
 
     /// The first samples, at least one of them.

@@ -82,13 +82,15 @@ pub enum RecordError {
     },
     /// A step that differs from the others where all need to be the same.
     #[error(
-        "row {row}, column t: a step of {} s in place of {} s; features need one step: resample the record, or fit or diagnose it without an estimator",
+        "row {row}, column {column}: a step of {} s in place of {} s; features need one step: resample the record, or fit or diagnose it without an estimator",
         number(*given),
         number(*expected)
     )]
     Uneven {
         /// Row of the file that the step leads to; the header is row 1.
         row: usize,
+        /// Column of the times.
+        column: String,
         /// The step in seconds.
         given: f64,
         /// The step in seconds that is needed: the study's, or the median one.
@@ -96,9 +98,20 @@ pub enum RecordError {
     },
     /// Steps that vary where a twin takes one.
     #[error(
-        "column t: the steps vary, and a black-box twin is simulated with one step; resample the record"
+        "row {row}, column {column}: a step of {} s in place of {} s; a black-box twin is simulated with one step: resample the record",
+        number(*given),
+        number(*expected)
     )]
-    OneStep,
+    OneStep {
+        /// Row of the file that the oddest step leads to; the header is row 1.
+        row: usize,
+        /// Column of the times.
+        column: String,
+        /// The step in seconds.
+        given: f64,
+        /// The median step.
+        expected: f64,
+    },
     /// A start that belongs to a time after the first row, or to one too long before it.
     #[error("{0}")]
     Start(String),

@@ -172,19 +172,21 @@ impl Record {
     pub(crate) fn check_complete_at(&self, expected: f64) -> Result<(), RecordError> {
         let mut cells = self.outputs.indexed_iter();
         if let Some(((k, j), _)) = cells.find(|(_, v)| v.is_nan()) {
+            let rows = self.drive.rows();
+            let usual = || column_names("y", self.outputs.ncols()).swap_remove(j);
             return Err(RecordError::Incomplete {
-                row: self.drive.rows().line(k),
-                column: column_names("y", self.outputs.ncols()).swap_remove(j),
+                row: rows.line(k),
+                column: rows.column(1 + self.drive.inputs().ncols() + j, usual),
             });
         }
-        match self.drive.oddest_step() {
-            None => Ok(()),
-            Some(k) => Err(RecordError::Uneven {
+        (self.drive.oddest_step()).map_or(Ok(()), |k| {
+            Err(RecordError::Uneven {
                 row: self.drive.rows().line(k + 1),
+                column: self.drive.rows().column(0, || "t".into()),
                 given: six_digits(self.drive.step(k)),
                 expected,
-            }),
-        }
+            })
+        })
     }
 
     /// The first samples; `None` where an output of the record has no value in them.

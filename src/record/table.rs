@@ -1,6 +1,6 @@
 //! The numbers of a record file, checked cell by cell.
 
-use super::channels::{Signals, column_names, columns, is_usual, names_in_brackets};
+use super::channels::{Signals, columns, is_usual, names_in_brackets};
 use super::columns::Wanted;
 use super::drive::FileRows;
 use super::stamp::Stamp;
@@ -34,15 +34,14 @@ impl Table {
     /// The table as time and inputs alone.
     pub fn drive(self, path: &Path) -> Result<Drive, RecordError> {
         if self.outputs.ncols() > 0 {
-            let names = excerpt(&column_names("y", self.outputs.ncols()).join(","));
+            let names = excerpt(&self.names[1 + self.inputs.ncols()..].join(","));
             let problem =
                 format!("{names}: an input file has t and inputs alone; remove the output columns");
             return Err(RecordError::file(path, problem));
         }
-        let inputs = self.inputs.ncols();
         match Drive::with_times(&self.times, self.inputs) {
             Ok(drive) => Ok(drive.read_from(self.rows)),
-            Err(error) => Err(in_file(error, path, &self.names[0], inputs, &self.rows)),
+            Err(error) => Err(in_file(error, path, &self.names, &self.rows)),
         }
     }
 
@@ -52,10 +51,9 @@ impl Table {
             let problem = "no output column; a record needs y, or y1,y2,…";
             return Err(RecordError::file(path, problem));
         }
-        let inputs = self.inputs.ncols();
         (Drive::with_times(&self.times, self.inputs))
             .and_then(|drive| Record::new(drive.read_from(self.rows.clone()), self.outputs))
-            .map_err(|error| in_file(error, path, &self.names[0], inputs, &self.rows))
+            .map_err(|error| in_file(error, path, &self.names, &self.rows))
     }
 
     /// Parses a table; `read` counts the numbers of this file and those before.
@@ -152,38 +150,29 @@ impl Table {
                 .map_err(|error| RecordError::file(path, error))
         };
         Ok(Self {
+            rows: FileRows::of(surplus, &names, parser.first.is_some()),
             names,
             times: t,
             inputs: signal(inputs, u)?,
             outputs: signal(outputs, y)?,
-            rows: FileRows::of(surplus, parser.first.is_some()),
         })
     }
 }
 
 /// Adds file, row and column to an error of the numbers of a table.
-fn in_file(
-    error: RecordError,
-    path: &Path,
-    time: &str,
-    inputs: usize,
-    rows: &FileRows,
-) -> RecordError {
+fn in_file(error: RecordError, path: &Path, names: &[String], rows: &FileRows) -> RecordError {
     match error {
         RecordError::TimeOrder { sample, .. } => {
-            RecordError::cell(path, rows.line(sample), time, error.to_string())
+            RecordError::cell(path, rows.line(sample), &names[0], error.to_string())
         }
         RecordError::ReplicateInputs {
             sample, channel, ..
-        } => {
-            let column = column_names("u", inputs).swap_remove(channel - 1);
-            RecordError::cell(path, rows.line(sample), &column, error.to_string())
-        }
+        } => RecordError::cell(path, rows.line(sample), &names[channel], error.to_string()),
         RecordError::Step(step) => RecordError::file(
             path,
             format!(
                 "column {}: a step of {} s is too small to compute with; write t in seconds",
-                quoted(time),
+                quoted(&names[0]),
                 number(step)
             ),
         ),

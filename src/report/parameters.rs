@@ -111,9 +111,10 @@ impl ParameterRow {
         let is_outside = high < self.prior.low() || low > self.prior.high();
         let is_anywhere = low <= self.bounds.low() && high >= self.bounds.high();
         match (self.at_bound, self.role) {
-            (None, Role::Magnitude) if self.is_shown() => match self.value.is_finite() {
-                true => "shown by the readings",
-                false => "off",
+            (None, Role::Magnitude) if self.is_shown() && self.value.is_infinite() => "off",
+            (None, Role::Magnitude) if self.is_shown() => match self.value {
+                end if end == self.prior.low() || end == self.prior.high() => "end of the prior",
+                _ => "shown by the readings",
             },
             (Some(Side::Low), _) => "at lower bound",
             (Some(_), _) => "at upper bound",

@@ -125,6 +125,9 @@ pub enum StorageError {
         /// Problem of its content.
         reason: String,
     },
+    /// A part of a work folder that is gone.
+    #[error("{}: is missing; remove the folder and start again", .0.display())]
+    Missing(PathBuf),
     /// A text that is no share.
     #[error("\"{0}\" is no share; write i/n: share i of n, such as 1/4")]
     Share(String),
@@ -158,6 +161,14 @@ impl StorageError {
         Self::Io {
             path: path.into(),
             error,
+        }
+    }
+
+    /// Creates an error about what a folder was made with.
+    pub(crate) fn kept(path: &Path, error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::NotFound => Self::Missing(path.into()),
+            _ => Self::io(path, error),
         }
     }
 

@@ -68,8 +68,11 @@ impl Study {
         progress: &Progress,
     ) -> Result<Fit, StudyError> {
         SettingError::unless_level("level", settings.level, 0.9)?;
-        for record in records {
-            self.check_channels(record)?;
+        for (index, record) in records.iter().enumerate() {
+            (self.check_channels(record)).map_err(|error| StudyError::Channels {
+                record: Some(index),
+                error,
+            })?;
         }
         Record::check_outputs(records, &self.twin.signals().outputs)?;
         let clock = Instant::now();
@@ -184,7 +187,7 @@ impl Study {
     }
 
     /// Effects that the study's file adds to the twin.
-    fn added_effects(&self) -> Result<Vec<Effect>, StudyError> {
+    pub(crate) fn added_effects(&self) -> Result<Vec<Effect>, StudyError> {
         let effects = self
             .file
             .effect

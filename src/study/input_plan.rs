@@ -150,7 +150,7 @@ impl PlannedInputs {
         }
         if let Some(name) = names().find(|name| !plans.contains_key(*name)) {
             return Err(format!(
-                "input: {} has no plan; give each of {} its own: {{ levels = [low, high], hold = n }}, a number, or a file",
+                "input: {} has no plan; give each of {} its own: {{ levels = [low, high], hold = n }}, a number, or in a study file a file",
                 excerpt(name),
                 all()
             ));

@@ -385,9 +385,9 @@ impl Study {
         Ok(record.check_complete()?)
     }
 
-    /// Checks that a record has the channels of this study, and begins no earlier than the start of the twin.
+    /// Checks that a record has the channels of this study, and steps that its twin can take.
     pub(crate) fn check_channels(&self, record: &Record) -> Result<(), RecordError> {
         record.check_channels(&self.twin.signals())?;
-        self.twin.check_start(record.drive())
+        self.twin.check_drive(record.drive())
     }
 }

@@ -45,6 +45,12 @@ class Rows:
         return f"{', '.join(map(str, positions))}{more} (counted from 0{index})"
 
 
+def word(path: str | os.PathLike[str]) -> str:
+    """Return a path as a word of a call, which is no option."""
+    text = os.fspath(path)
+    return f".{os.sep}{text}" if text.startswith("-") else text
+
+
 class Names:
     """The words for the files and the simulator of one call.
 

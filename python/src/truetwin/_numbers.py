@@ -59,7 +59,8 @@ def count(name: str, value: object, least: int, most: int | None = None) -> int:
     except TypeError:
         integer = None
     if integer is None or integer < least or most is not None and integer > most:
-        limits = f"at least {least}" if most is None else f"from {least} to {most}"
+        largest = most if most is None or most < 10**8 else f"2**{most.bit_length()} - 1"
+        limits = f"at least {least}" if most is None else f"from {least} to {largest}"
         raise ValueError(f"{name} = {shown(value)}; give a whole number, {limits}")
     return integer
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 import numpy.typing as npt
 
-from ._names import Names, Rows
+from ._names import Names, Rows, word
 from ._numbers import Array, one_line, reals
 from ._times import is_timed, seconds
 
@@ -40,7 +40,10 @@ def as_list(records: Records) -> list[Record]:
         return [records]  # type: ignore[list-item, unused-ignore]
     if not isinstance(records, Iterable):
         raise TypeError(f"records of type {type(records).__name__}; give a path, a DataFrame, a dict of arrays, or a list of these")
-    return list(records)  # type: ignore[arg-type, unused-ignore]
+    given: list[Record] = list(records)  # type: ignore[arg-type, unused-ignore]
+    if not given:
+        raise ValueError("records: none is given; pass at least one")
+    return given
 
 
 class Writer:
@@ -78,7 +81,7 @@ class Writer:
         A record that is `driven` needs no outputs.
         """
         if isinstance(record, (str, os.PathLike)):
-            return os.fspath(record)
+            return word(record)
         if not (isinstance(record, Mapping) or is_frame(record)):
             raise TypeError(f"{name}: a record of type {type(record).__name__}; give a path, a DataFrame or a dict of arrays")
         columns = self._chosen(name, record, driven)
@@ -190,10 +193,15 @@ def write(path: Path, header: str, columns: Mapping[str, Array]) -> None:
         file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
 
 
-def _cell(text: str) -> str:
-    if any(c in text for c in ',"\r\n;\t#'):
+def _cell(text: str, odd: str = ',"\r\n;\t#') -> str:
+    if any(c in text for c in odd):
         return '"' + text.replace('"', '""') + '"'
     return text
+
+
+def columns_of(columns: Mapping[str, str]) -> str:
+    """Return names of columns as the program takes them."""
+    return ",".join(f"{name}={_cell(column, ',' + chr(34))}" for name, column in columns.items())
 
 
 def read(path: Path, inputs: Sequence[str], outputs: Sequence[str]) -> dict[str, Array]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, overload
 from . import _process, _records
 from ._equations import Entry, Expression, Text, is_expression
 from ._errors import TruetwinError
-from ._names import Names
+from ._names import Names, word
 from ._numbers import Array, count, number, whole
 from ._points import Equation, PointModel, States
 from ._records import Record, Records
@@ -309,7 +309,7 @@ class Twin:
             Its file is an argument of `estimate`.
         """
         with _Call(self) as call:
-            options = [*call.subject(noise=True), "--out", os.fspath(out), *_option("--bank-size", bank_size, 1), *_option("--epochs", epochs, 1)]
+            options = [*call.subject(noise=True), "--out", word(out), *_option("--bank-size", bank_size, 1), *_option("--epochs", epochs, 1)]
             raw = json.loads(call.run("pretrain", [*options, "--json"], seed))
             return Estimator._of(raw, Path(out))
 
@@ -347,7 +347,7 @@ class Twin:
         Estimate
         """
         with _Call(self) as call:
-            options = [call.record("record", record, columns), *call.columns(columns), "--estimator", os.fspath(estimator)]
+            options = [call.record("record", record, columns), *call.columns(columns), "--estimator", word(estimator)]
             if validation is not None:
                 options += ["--validation", call.record("validation", validation, columns)]
             options += ["--always-refine"] * always_refine + ["--step-of-record"] * step_of_record
@@ -514,15 +514,15 @@ class _Call:
         """Return the option that names columns."""
         if not columns:
             return []
-        if odd := [name for name in columns.values() if "," in name]:
-            raise ValueError(f"columns: {odd[0]!r} holds a comma; rename the column")
-        return ["--columns", ",".join(f"{name}={column}" for name, column in columns.items())]
+        if odd := [name for name, column in columns.items() if not (isinstance(column, str) and column.strip())]:
+            raise ValueError(f"columns: {odd[0]} = {columns[odd[0]]!r}; give the name of a column")
+        return ["--columns", _records.columns_of(columns)]
 
     def subject(self, noise: bool = False) -> list[str]:
         """Return the options that name the twin."""
         twin = self._twin
         if twin._study is not None:
-            return ["--study", os.fspath(twin._study)]
+            return ["--study", word(twin._study)]
         if twin._text is not None:
             file = self.path / "twin.toml"
             file.write_text(twin._text.text, encoding="utf-8")
@@ -563,7 +563,7 @@ class _Call:
     def folder(self, verb: str, options: Sequence[str], seed: int, out: Path_ | None) -> tuple[Path, str]:
         """Run a verb that fills a folder; return the folder and what it prints."""
         folder = self.path / "result" if out is None else Path(out)
-        return folder, self.run(verb, [*options, "--out", str(folder)], seed)
+        return folder, self.run(verb, [*options, "--out", word(folder)], seed)
 
 
 def _names_of(entries: States) -> list[str]:

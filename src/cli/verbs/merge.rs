@@ -26,7 +26,10 @@ const FILES: [&str; 8] = ["csv", "gz", "json", "npy", "npz", "parquet", "txt", "
 
 impl Verb for Merge {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        output::check_new(&self.out)?;
+        match file::is_named(&self.out) {
+            true => output::check_new_file(&self.out)?,
+            false => output::check_new(&self.out)?,
+        }
         let ending = self.out.extension().unwrap_or_default().to_string_lossy();
         if FILES.contains(&&*ending.to_lowercase()) && !file::is_named(&self.out) {
             return Err(Failure::user(format!(

@@ -232,7 +232,15 @@ fn kept(
         }
     }
     context.ranks.wait();
-    let estimator = Estimator::load(&path, context.projects)?;
+    let estimator = Estimator::load(&path, context.projects).map_err(|error| match error {
+        error @ EstimatorError::Work(_) => Failure::from(error),
+        // It is a piece of this folder, which nobody pretrains elsewhere.
+        _ => StorageError::Piece {
+            path: path.clone(),
+            reason: "it is not the estimator that was written".into(),
+        }
+        .into(),
+    })?;
     folder.seal("estimator.est", "reproduce")?;
     Ok(estimator)
 }

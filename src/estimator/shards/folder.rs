@@ -91,8 +91,20 @@ impl Shards {
                 continue;
             }
             if let Some(other) = there.insert(number, checksum.to_owned()) {
-                let [one, other] = [checksum, &other].map(|c| place.join(name(number, c)));
-                return Err(conflict(&one, &other));
+                let noted = manifest.checksums().and_then(|sums| sums[number].as_str());
+                let both = [checksum, &other];
+                let stray = both
+                    .into_iter()
+                    .find(|c| noted.is_some_and(|own| own != *c));
+                let at = |c| place.join(name(number, c));
+                return Err(match stray {
+                    Some(stray) => {
+                        let stray = at(stray);
+                        let problem = "no shard of this bank; remove it";
+                        EstimatorError::Bank(format!("{}: {problem}", stray.display()))
+                    }
+                    None => conflict(&at(checksum), &at(&other)),
+                });
             }
         }
         Ok(Self {
@@ -236,7 +248,7 @@ fn damaged(path: &Path, reason: &str) -> EstimatorError {
 /// Two folders hold different rows under the same numbers.
 pub(super) fn conflict(one: &Path, other: &Path) -> EstimatorError {
     EstimatorError::Bank(format!(
-        "{} and {} differ, and should hold the same rows; make both with the same build on machines of one kind",
+        "{} and {} differ, and should hold the same rows; make both with the same build on machines of one kind, or remove the one that is of another bank",
         one.display(),
         other.display()
     ))

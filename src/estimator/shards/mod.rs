@@ -234,7 +234,8 @@ fn listed(from: &[PathBuf]) -> Result<Vec<Shards>, EstimatorError> {
         })
         .collect::<Result<Vec<Shards>, EstimatorError>>()?;
     for (other, path) in all.iter().zip(from).skip(1) {
-        if let Some(difference) = all[0].manifest.differs(&other.manifest) {
+        let tell = |key: &str, first: &str, other: &str| format!("{key} is {first} and {other}");
+        if let Some(difference) = all[0].manifest.difference(&other.manifest, tell) {
             return Err(EstimatorError::Bank(format!(
                 "{} and {} are of different banks: {difference}; merge folders of one call",
                 from[0].display(),

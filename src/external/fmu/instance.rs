@@ -26,7 +26,10 @@ pub(super) fn done<T>(
         | fmi::Error::Fmi3Error(fmi::fmi3::Fmi3Error::Fatal) => {
             SimulationError::fatal(format!("the FMU is corrupt: {what}: {error}"))
         }
-        _ => SimulationError::Failed(format!("the FMU refuses {what}: {error}").into()),
+        _ => {
+            let remedy = "try it at these parameters in the tool that made it";
+            SimulationError::Failed(format!("the FMU refuses {what} ({error}); {remedy}").into())
+        }
     })
 }
 

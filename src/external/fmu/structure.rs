@@ -45,6 +45,13 @@ pub(super) fn states(
             .and_then(named);
         let state = state.map(|node| FmuVariable::read(node, version, types));
         match state.transpose()?.flatten() {
+            Some(state)
+                if states
+                    .iter()
+                    .any(|other: &FmuVariable| other.name == state.name) =>
+            {
+                return Err(format!("<{tag} {key}=\"{of}\"> is listed twice"));
+            }
             Some(state) => states.push(state),
             None => {
                 return Err(format!(

@@ -1,6 +1,7 @@
 //! Unpacking an archive from elsewhere: into its folder alone, and no more than a disk can take.
 
 use crate::storage::untrusted::excerpt;
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek};
 use std::path::Path;
@@ -16,6 +17,13 @@ pub(super) const MOST_BYTES: u64 = 1 << 32;
 /// Refused are more entries or bytes than that, whatever the archive says about their number; names that lead out of the
 /// folder, absolute ones, names that stand there twice, and links. Nothing of such an archive is used.
 pub(super) fn unpack(from: impl Read + Seek, folder: &Path, most: u64) -> Result<(), String> {
+    let archive = ZipArchive::new(from).map_err(|error| error.to_string())?;
+    let directory = archive.central_directory_start();
+    let mut from = archive.into_inner();
+    // The library keeps the last of two entries with one name.
+    if let Some(name) = repeated(&mut from, directory).map_err(|error| error.to_string())? {
+        return Err(format!("it has two entries {}", excerpt(&name)));
+    }
     let mut archive = ZipArchive::new(from).map_err(|error| error.to_string())?;
     if archive.len() > MOST_ENTRIES {
         let entries = archive.len();
@@ -56,6 +64,29 @@ pub(super) fn unpack(from: impl Read + Seek, folder: &Path, most: u64) -> Result
         left -= written;
     }
     Ok(())
+}
+
+/// Returns a name that stands twice in the directory of an archive, which begins at this byte.
+fn repeated(from: &mut (impl Read + Seek), directory: u64) -> io::Result<Option<String>> {
+    let mut from = io::BufReader::new(from);
+    from.seek(io::SeekFrom::Start(directory))?;
+    let mut names = BTreeSet::new();
+    loop {
+        let mut head = [0; 46];
+        // Behind the last entry is the end of the directory, which may be shorter.
+        if from.read_exact(&mut head[..4]).is_err() || !head.starts_with(b"PK\x01\x02") {
+            return Ok(None);
+        }
+        from.read_exact(&mut head[4..])?;
+        let length = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
+        let mut name = vec![0; length(28).into()];
+        from.read_exact(&mut name)?;
+        from.seek_relative(i64::from(length(30)) + i64::from(length(32)))?;
+        let text = String::from_utf8_lossy(&name).into_owned();
+        if !names.insert(name) {
+            return Ok(Some(text));
+        }
+    }
 }
 
 #[cfg(test)]
@@ -102,6 +133,24 @@ mod tests {
             archive.start_file("link/x", options).unwrap();
         });
         assert!(refused(linked).contains("is a link"));
+    }
+
+    /// Which of two entries counts is up to who reads them.
+    #[test]
+    fn a_name_stands_once() {
+        let twice = packed(|archive| {
+            for name in ["one.txt", "two.txt"] {
+                archive
+                    .start_file(name, SimpleFileOptions::default())
+                    .unwrap();
+            }
+        });
+        let mut bytes = twice.into_inner();
+        while let Some(at) = bytes.windows(7).position(|w| w == b"two.txt") {
+            bytes[at..at + 7].copy_from_slice(b"one.txt");
+        }
+        let message = refused(Cursor::new(bytes));
+        assert!(message.contains("two entries one.txt"), "{message}");
     }
 
     #[test]

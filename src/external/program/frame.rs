@@ -3,7 +3,7 @@
 use super::asking::Reply;
 use super::inside::ServedMethod;
 use super::protocol::{check_id, error_text};
-use crate::setting::count;
+use crate::setting::{count, number};
 use crate::storage::untrusted::{Keyed, message};
 use crate::twin::Now;
 use serde::Deserialize;
@@ -129,7 +129,8 @@ pub(super) fn reply(
     match (told.bytes, told.error) {
         (Some(bytes), None) if bytes == expected => Ok(Reply::Good((), bytes)),
         (Some(bytes), None) => Err(format!(
-            "bytes = {bytes}, {} of {} are {expected}; give all of them",
+            "bytes = {}, {} of {} are {expected}; give all of them",
+            number(bytes as f64),
             count(rows, "row"),
             count(points, "number")
         )),

@@ -185,7 +185,7 @@ pub(super) fn answer(
         }
         (None, None, Some(text)) => error_text(&text).map(ProgramAnswer::Error),
         _ => Err(
-            "exactly one of outputs, diverged (a time in seconds) and error is needed; leave the others out"
+            "exactly one of outputs, diverged (a number, the time in seconds) and error is needed; leave the others out"
                 .into(),
         ),
     }

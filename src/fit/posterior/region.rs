@@ -56,10 +56,13 @@ impl PosteriorRegion {
             if !problem.axes[j].held {
                 continue;
             }
-            let value = fitted.theta[j];
-            if p.role == Role::Magnitude && (value <= p.bounds.low() || value >= p.bounds.high()) {
+            if p.role == Role::Magnitude {
+                let shown = fitted.theta[j];
+                let is_off = shown <= p.bounds.low() || shown >= p.bounds.high();
                 // What is off without end is so as far as the prior goes: features see no farther.
-                mean[j] = p.prior.clamp(value) / widths[j];
+                mean[j] = if is_off { p.prior.clamp(shown) } else { shown } / widths[j];
+                covariance.row_mut(j).fill(0.0);
+                covariance.column_mut(j).fill(0.0);
             }
             if p.role == Role::Start
                 && let Some((value, deviation)) = start(p.target())

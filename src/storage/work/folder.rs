@@ -69,6 +69,14 @@ impl WorkFolder {
             }
         }
         let opened = Self::resume(path, manifest)?;
+        for part in parts {
+            match std::fs::create_dir(opened.file(part)) {
+                Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+                    return Err(StorageError::io(&opened.file(part), error).into());
+                }
+                _ => {}
+            }
+        }
         opened.sweep();
         Ok(opened)
     }
@@ -161,13 +169,13 @@ impl WorkFolder {
     /// Reads a file of the folder as text.
     pub(crate) fn read(&self, name: &str) -> Result<String, StorageError> {
         let path = self.file(name);
-        read_kept_text(&path, MOST).map_err(|error| StorageError::io(&path, error))
+        read_kept_text(&path, MOST).map_err(|error| StorageError::kept(&path, error))
     }
 
     /// Returns the path of a part; a link out of the folder is refused.
     pub(crate) fn part(&self, part: &str) -> Result<PathBuf, StorageError> {
         let path = self.file(part);
-        check_folder(&path).map_err(|error| StorageError::io(&path, error))?;
+        check_folder(&path).map_err(|error| StorageError::kept(&path, error))?;
         Ok(path)
     }
 

@@ -119,13 +119,24 @@ impl Manifest {
 
     /// Returns the first difference from the `kept` manifest in words, finished or not; `None` if there is none.
     pub fn differs(&self, kept: &Self) -> Option<String> {
-        let keys = self.entries.keys().chain(kept.entries.keys());
-        let differs = |key: &&String| *key != CHECKSUMS && kept.get(key) != self.get(key);
+        self.difference(kept, |key, new, old| {
+            format!("{key} was {old}, now it is {new}")
+        })
+    }
+
+    /// Returns the first difference from another manifest as `tell` has it: of a key, the value here, and that of the other.
+    pub fn difference(
+        &self,
+        other: &Self,
+        tell: impl Fn(&str, &str, &str) -> String,
+    ) -> Option<String> {
+        let keys = self.entries.keys().chain(other.entries.keys());
+        let differs = |key: &&String| *key != CHECKSUMS && other.get(key) != self.get(key);
         let key = { keys }.find(differs)?;
-        let (old, new) = (shown(kept.get(key)), shown(self.get(key)));
-        let longest = old.chars().count().max(new.chars().count());
+        let (own, others) = (shown(self.get(key)), shown(other.get(key)));
+        let longest = own.chars().count().max(others.chars().count());
         Some(excerpt(&match longest <= SHORT {
-            true => format!("{key} was {old}, now it is {new}"),
+            true => tell(key, &own, &others),
             false => format!("other {key}"),
         }))
     }
