@@ -24,3 +24,4 @@ mod studies;
 #[path = "../common/timeless.rs"]
 mod timeless;
 mod versions;
+mod words;

@@ -1,7 +1,7 @@
 //! SIGINT and SIGTERM at random times in every verb that works for a while: it ends within two seconds with exit code 130, and what it says
 //! of what is kept is true.
 
-use crate::calls::{self, run, start, told};
+use crate::calls::{self, TRUETWIN, run, start, told};
 use crate::studies::short;
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// Two seconds are documented; the rest is for a loaded machine.
@@ -199,4 +199,62 @@ fn long_work_hears_a_signal_at_any_time() {
 #[ignore = "240 signals, twenty minutes on a quiet machine"]
 fn every_verb_hears_a_signal_at_any_time() {
     heard(2, 20, 6000, Duration::from_secs(6), |_| true);
+}
+
+/// A lag with noise that takes its time for each run: the second argument, in seconds.
+const SLOW: &str = r#"
+import json, random, sys, time
+told = {"name": "lag", "parameters": [{"name": "a", "prior": [0.5, 1.5]}], "inputs": [{"name": "u"}], "outputs": [{"name": "y"}],
+        "record": {"step": 0.1, "samples": 40, "input": {"levels": [-1, 1], "hold": 10}}}
+for line in sys.stdin:
+    r = json.loads(line)
+    if r["request"] == "describe":
+        print(json.dumps(told), flush=True)
+        continue
+    time.sleep(float(sys.argv[1]))
+    x, y, noise = 0.0, [], random.Random(r["seed"])
+    for u in r["inputs"]["u"]:
+        y.append(x + 0.02 * noise.gauss(0, 1))
+        x += r["step"] * (u - r["theta"]["a"] * x)
+    print(json.dumps({"id": r["id"], "outputs": {"y": y}}), flush=True)
+"#;
+
+/// A pass over a record takes many runs of a program, and one run may take minutes: neither holds up the end.
+#[test]
+fn a_slow_program_holds_nothing_up() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    fs::write(at.join("slow.py"), SLOW).unwrap();
+    let rows = (0..40).map(|k| format!("{},{},{}\n", 0.1 * f64::from(k), k / 10 % 2, k % 7));
+    fs::write(
+        at.join("r.csv"),
+        format!("t,u,y\n{}", rows.collect::<String>()),
+    )
+    .unwrap();
+    for verb in ["fit", "diagnose"] {
+        for seconds in ["0.2", "100"] {
+            let mut call = Command::new(TRUETWIN);
+            let program = format!("python3 slow.py {seconds}");
+            call.args([verb, "r.csv", "--threads", "1", "--program", &program]);
+            let call = call
+                .current_dir(at)
+                .stdout(Stdio::null())
+                .stderr(Stdio::piped());
+            let child = call.spawn().unwrap();
+            std::thread::sleep(Duration::from_millis(1500));
+            let since = Instant::now();
+            calls::signal(&child, "-INT");
+            let output = child.wait_with_output().unwrap();
+            assert_eq!(
+                output.status.code(),
+                Some(130),
+                "{verb} {seconds}: {output:?}"
+            );
+            assert!(
+                since.elapsed() < HEARD,
+                "{verb} {seconds}: {:?}",
+                since.elapsed()
+            );
+        }
+    }
 }
