@@ -19,6 +19,7 @@ use crate::hypothesis::search::model::Model;
 use crate::hypothesis::shared;
 use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::measured;
+use crate::math::descending;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use crate::twin::{Noise, Role, Twin};
@@ -74,12 +75,26 @@ impl Base {
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
         let has_effects = space.iter().any(|p| p.role == Role::Magnitude);
-        let fitted = if has_effects && initial.is_none() && !problem.is_simulated() {
+        let fitted = if has_effects && !problem.is_simulated() {
             // As a fit of the study has them: the same starts, and the same ends of ranges that readings show.
             let effects = study.added_effects()?;
-            let searched = searched(&measured, &effects, records, starts, passes)?;
+            let mut searched = searched(&measured, &effects, records, starts, passes)?;
+            let problem = searched.problem;
+            if let Some((theta, best)) = initial.as_ref().zip(searched.fits.first()) {
+                let start = problem.clamp(&problem.full(theta)).into_iter().enumerate();
+                let held = |(j, value): (usize, f64)| {
+                    if problem.axes[j].held {
+                        best.theta[j]
+                    } else {
+                        value
+                    }
+                };
+                let start: Vec<f64> = start.map(held).collect();
+                searched.fits.extend(climb(&problem, &start, ITERATIONS)?);
+            }
+            descending(&mut searched.fits, |fit| fit.objective);
             let best = searched.fits.into_iter().next();
-            best.map(|fitted| (searched.problem, fitted))
+            best.map(|fitted| (problem, fitted))
         } else if !problem.is_simulated() {
             let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
             let found = thorough(&problem, &initial, starts)?;

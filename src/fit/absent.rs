@@ -1,4 +1,4 @@
-//! What records say for fitted effects: the evidence that they gain, and intervals that hold where an effect is off.
+//! Fitted effects and the twin without them: evidence that they gain, and intervals that hold where an effect is off.
 
 use super::climb::{Fitted, climb};
 use super::evidence::{Evidence, evidence};

@@ -26,7 +26,7 @@ use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern};
 use crate::equations::Declared;
 use crate::record::{Drive, Record, RecordError};
 use crate::setting::did_you_mean;
-use crate::twin::{DeclaredNoise, DigitalTwin, Hold, Noise, NoiseLevel, Now, Twin, check_twin};
+use crate::twin::{DeclaredNoise, DigitalTwin, Hold, Noise, NoiseLevel, Twin, check_twin};
 use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
@@ -236,33 +236,20 @@ impl Study {
     /// Declares the process noise of the twin's code where it is another in a step of this file than in the `own` step of the twin's text, which has a
     /// number for it.
     fn noise_of_step(&self, own: f64, file: &mut StudyFile) {
-        let code = self
-            .base
-            .equations()
-            .filter(|_| file.noise.process.is_none());
-        let Some((twin, step)) = code.zip(file.record.step) else {
+        let Some(step) = file.record.step.filter(|_| file.noise.process.is_none()) else {
             return;
         };
-        let outline = twin.outline();
-        let theta = outline.parameters.centre();
-        let inputs = vec![0.0; outline.inputs.len()];
-        let (n, p) = (outline.states.len(), outline.outputs.len());
-        let levels = [own, step].map(|dt| {
-            let now = Now::new(0.0, dt, &inputs, &theta);
-            let (mut x, mut process) = (vec![0.0; n], vec![0.0; n]);
-            twin.start(&now, &mut x);
-            twin.noise(&now, &x, &mut process, &mut vec![0.0; p]);
-            process
-        });
-        for (i, state) in outline.states.iter().enumerate() {
-            let [at_own, level] = [levels[0][i], levels[1][i]];
+        let own = self.base.process_noise(own);
+        for ((state, level), (_, at_own)) in self.base.process_noise(step).into_iter().zip(own) {
             if level != at_own {
-                let declared = NoiseLevel::Declared(DeclaredNoise {
+                let declared = DeclaredNoise {
                     known: false,
                     ..DeclaredNoise::known(level)
-                });
+                };
                 let levels = &mut file.noise.levels;
-                levels.entry(state.name.clone()).or_insert(declared);
+                levels
+                    .entry(state)
+                    .or_insert(NoiseLevel::Declared(declared));
             }
         }
     }

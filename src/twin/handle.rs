@@ -87,6 +87,23 @@ impl Twin {
         }
     }
 
+    /// Process noise that the code adds to each state in a step of this length at the prior's centre; empty for a black box.
+    pub(crate) fn process_noise(&self, dt: f64) -> Vec<(String, f64)> {
+        let Self::Equations(twin) = self else {
+            return vec![];
+        };
+        let outline = twin.outline();
+        let theta = outline.parameters.centre();
+        let inputs = vec![0.0; outline.inputs.len()];
+        let now = Now::new(0.0, dt, &inputs, &theta);
+        let mut x = vec![0.0; outline.states.len()];
+        let (mut process, mut measurement) = (x.clone(), vec![0.0; outline.outputs.len()]);
+        twin.start(&now, &mut x);
+        twin.noise(&now, &x, &mut process, &mut measurement);
+        let names = outline.states.into_iter().map(|state| state.name);
+        names.zip(process).collect()
+    }
+
     /// Checks that the twin can be simulated on the time grid of a drive: equations start no later than at its first row, a black box needs one
     /// step.
     pub(crate) fn check_drive(&self, drive: &Drive) -> Result<(), RecordError> {
