@@ -91,18 +91,15 @@ impl Shards {
                 continue;
             }
             if let Some(other) = there.insert(number, checksum.to_owned()) {
-                let noted = manifest.checksums().and_then(|sums| sums[number].as_str());
-                let both = [checksum, &other];
-                let stray = both
-                    .into_iter()
-                    .find(|c| noted.is_some_and(|own| own != *c));
                 let at = |c| place.join(name(number, c));
+                let (_, kept) = WorkFolder::find(folder.path(), VERB)?;
+                let own = kept.checksums().and_then(|sums| sums[number].as_str());
+                let stray = own.map(|own| if own == checksum { &other } else { checksum });
                 return Err(match stray {
-                    Some(stray) => {
-                        let stray = at(stray);
-                        let problem = "no shard of this bank; remove it";
-                        EstimatorError::Bank(format!("{}: {problem}", stray.display()))
-                    }
+                    Some(stray) => EstimatorError::Bank(format!(
+                        "{}: no shard of this bank; remove it",
+                        at(stray).display()
+                    )),
                     None => conflict(&at(checksum), &at(&other)),
                 });
             }
