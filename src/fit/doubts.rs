@@ -72,12 +72,12 @@ const REMEDIES: [(&str, &str); 23] = [
         "declare that level of noise; if it is louder than it can be, diagnose what the twin lacks",
     ),
     (
-        NOT_CONVERGED,
-        "narrow the priors, or fix a parameter, a start or a noise level that the record does not identify",
-    ),
-    (
         "not-asked",
         "leave out what the record does not ask for, one effect at a time",
+    ),
+    (
+        NOT_CONVERGED,
+        "narrow the priors, or fix a parameter, a start or a noise level that the record does not identify",
     ),
     (
         "process-noise",

@@ -116,7 +116,11 @@ fn starts_are_known_unless_a_record_says_otherwise() {
         starts: ["x1".to_owned(), "x2".to_owned()].into(),
         ..beliefs(0.05)
     };
-    assert_eq!(deviations(&oscillator, &later, &held), ([0.0; 2], None));
+    // What is declared stands, and is told of the state that the output shows.
+    let (std, elsewhere) = deviations(&oscillator, &later, &held);
+    let elsewhere = elsewhere.unwrap();
+    assert_eq!((std, elsewhere.is_held), ([0.0; 2], true));
+    assert_eq!(elsewhere.states, ["x1"]);
     let at_ten = later.drive().clone().beginning_at(10.0);
     let at_ten = Record::new(at_ten, later.outputs().clone()).unwrap();
     let (std, elsewhere) = deviations(&oscillator, &at_ten, &held);

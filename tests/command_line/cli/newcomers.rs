@@ -95,7 +95,10 @@ fn a_file_of_another_kind_is_no_estimator() {
     std::fs::write(at("half.est"), &whole[..whole.len() / 2]).unwrap();
     told(
         &["estimate", &record, "--estimator", &at("half.est")],
-        &["half.est", "not a whole estimator file (it is cut off, or goes on behind its end)"],
+        &[
+            "half.est",
+            "not a whole estimator file (it is cut off, or goes on behind its end)",
+        ],
     );
 }
 
