@@ -44,7 +44,19 @@ impl Columns {
     /// Checks that each key is a channel of a twin, or the time.
     pub(crate) fn check(&self, signals: &Signals) -> Result<(), String> {
         let mut keys = self.0.keys();
-        keys.try_for_each(|key| channel_of(key, Some(signals)).map(drop))
+        keys.try_for_each(|key| channel_of(key, Some(signals)).map(drop))?;
+        let header = self.header(signals);
+        let is_odd = |name: &&String| {
+            let same = header.iter().filter(|other| other == name).count();
+            same > 1 || name.trim().is_empty()
+        };
+        match header.iter().find(is_odd) {
+            Some(name) => Err(format!(
+                "columns: \"{}\" is no column, or that of two channels; give each channel a column of its own",
+                quoted(name)
+            )),
+            None => Ok(()),
+        }
     }
 
     /// Header of a file that is read with these columns as a record of a twin: other columns have names that its reader tells apart.

@@ -196,7 +196,7 @@ impl Drive {
 
     /// Checks that all steps are the same, as a twin needs it that is told one step.
     pub(crate) fn check_uniform(&self) -> Result<(), RecordError> {
-        self.oddest_step().map_or(Ok(()), |k| {
+        self.oddest_step(self.dt).map_or(Ok(()), |k| {
             Err(RecordError::OneStep {
                 row: self.rows.line(k + 1),
                 column: self.rows.column(0, || "t".into()),
@@ -334,9 +334,9 @@ impl Drive {
         }
     }
 
-    /// Row whose step differs most from Δt; none where all are Δt.
-    pub(crate) fn oddest_step(&self) -> Option<usize> {
-        let off = |k: &usize| (self.step(*k) - self.dt).abs();
+    /// Row whose step differs most from the usual one; none where all are Δt.
+    pub(crate) fn oddest_step(&self, usual: f64) -> Option<usize> {
+        let off = |k: &usize| (self.step(*k) - usual).abs();
         let farthest = (0..self.samples()).max_by(|a, b| off(a).total_cmp(&off(b)));
         farthest.filter(|_| !self.is_uniform())
     }

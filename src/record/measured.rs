@@ -179,7 +179,7 @@ impl Record {
                 column: rows.column(1 + self.drive.inputs().ncols() + j, usual),
             });
         }
-        (self.drive.oddest_step()).map_or(Ok(()), |k| {
+        (self.drive.oddest_step(expected)).map_or(Ok(()), |k| {
             Err(RecordError::Uneven {
                 row: self.drive.rows().line(k + 1),
                 column: self.drive.rows().column(0, || "t".into()),

@@ -363,7 +363,7 @@ fn channels(all: &[ColumnName<'_>], signals: Option<&Signals>) -> Result<(usize,
             name if !is_usual(name) => {
                 "is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,…, and remove others"
             }
-            _ if !is_expected => match signals.and_then(|signals| too_many(all, signals)) {
+            _ if !is_expected => match signals.and_then(|signals| other_number(all, signals)) {
                 Some(problem) => return Err(problem),
                 None => &format!("is out of order; {rename}"),
             },
@@ -377,8 +377,8 @@ fn channels(all: &[ColumnName<'_>], signals: Option<&Signals>) -> Result<(usize,
     }
 }
 
-/// Says which channels a file has more of than the twin.
-fn too_many(all: &[ColumnName<'_>], signals: &Signals) -> Option<String> {
+/// Says which channels a file has more of than the twin, or of inputs fewer.
+fn other_number(all: &[ColumnName<'_>], signals: &Signals) -> Option<String> {
     let sides = [
         ("u", "input", &signals.inputs),
         ("y", "output", &signals.outputs),
@@ -387,7 +387,8 @@ fn too_many(all: &[ColumnName<'_>], signals: &Signals) -> Option<String> {
         let of_file = all.iter().filter(|(usual, _)| usual.starts_with(letter));
         let of_file: Vec<&str> = of_file.map(|(_, own)| *own).collect();
         let expected = channels.len();
-        (of_file.len() > expected).then(|| {
+        let is_short = kind == "input" && of_file.len() < expected;
+        (is_short || of_file.len() > expected).then(|| {
             format!(
                 "the record has {} ({}), the twin has {expected}{}; choose the twin that this record is of, or correct the columns",
                 count(of_file.len(), kind),

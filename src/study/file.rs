@@ -163,7 +163,16 @@ impl StudyFile {
             return Err(wrong(1, &format!("more than {} MiB of text", MOST >> 20)));
         }
         let unread = |error: toml::de::Error| match error.span() {
-            Some(span) => wrong(line(text, span.start), error.message()),
+            Some(span) => wrong(
+                line(text, span.start),
+                match error.message() {
+                    // Of a word that begins as `true` or `false` does.
+                    told if told.starts_with("invalid boolean") => {
+                        "a text without quotes; write it in quotes, or true or false"
+                    }
+                    told => told,
+                },
+            ),
             None => wrong(line_of_depth(text), "a table or a list is nested too deep"),
         };
         let mut table = DeTable::parse(text).map_err(unread)?;

@@ -274,7 +274,7 @@ fn read(path: &Path, channels: usize) -> Result<Drive, StudyError> {
 }
 
 fn check_one_step(path: &Path, drive: &Drive) -> Result<(), StudyError> {
-    match drive.oddest_step() {
+    match drive.oddest_step(drive.dt()) {
         None => Ok(()),
         Some(k) => Err(StudyError::Plan(format!(
             "{}, row {}, column t: a step of {} s in place of {} s; simulated records need one step: write the inputs with one",

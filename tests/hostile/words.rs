@@ -137,6 +137,22 @@ fn a_start_that_stands_is_told() {
     assert_eq!(fit["starts"][1]["value"], 0.0, "{}", fit["starts"]);
 }
 
+/// A start that nobody declares is found wherever the record begins: here four thousand times the motion that the input causes.
+#[test]
+fn a_start_is_found_however_far() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let far = LAG.replace("start = 0.0", "start = 5000.0");
+    write(at, "far.toml", &far);
+    write(at, "open.toml", &LAG.replace(", start = 0.0", ""));
+    done(at, "simulate --study far.toml --theta a=0.7 --out far.csv");
+    let [declared, found] = ["far", "open"].map(|name| {
+        let fit = json(at, &format!("fit far.csv --study {name}.toml"));
+        fit["evidence"]["log_evidence"].as_f64().unwrap()
+    });
+    assert!(found > declared - 20.0, "{declared} {found}");
+}
+
 /// The noise of the van der Pol oscillator is one of its step, as its text then says.
 #[test]
 fn an_exported_twin_has_the_noise_of_its_step() {
@@ -220,6 +236,35 @@ fn columns_have_the_names_of_the_file() {
         "simulate --study lag.toml --theta a=0.7 --input same.csv",
         &["same.csv: level: an input file"],
     );
+    for columns in [
+        "push = \"level\"",
+        "t = \"time\"\npush = \"time\"",
+        "push = \" \"",
+    ] {
+        write(
+            at,
+            "two.toml",
+            &format!("{LAG}[record.columns]\n{columns}\n"),
+        );
+        let call = "simulate --study two.toml --theta a=0.7";
+        refused(at, call, &["two.toml", "a column of its own"]);
+    }
+    let two = LAG.replace("push = {}", "push = {}\nheat = {}");
+    write(at, "two.toml", &two);
+    write(at, "one.csv", "t,u2,y\n0,1,1\n1,1,2\n2,1,2\n");
+    refused(
+        at,
+        "fit one.csv --study two.toml",
+        &["the record has 1 input (u2), the twin has 2 (u1,u2)"],
+    );
+    let times = (0..30).map(|k| f64::from(k) - if k > 5 { 0.5 } else { 0.0 });
+    let rows = times.map(|t| format!("{t},1,0.5\n"));
+    write(at, "v.csv", &format!("t,u,y\n{}", rows.collect::<String>()));
+    refused(
+        at,
+        "features v.csv --study lag.toml",
+        &["column t: a step of 1 s in place of 0.2 s"],
+    );
     write(at, "p.PARQUET", "PAR1PAR1");
     refused(
         at,
@@ -240,6 +285,10 @@ fn faults_of_a_study_are_where_an_editor_finds_them() {
         (
             "twin = \"tanks\"\n[prior]\n\n\n\"k\\u0031\" = [0.9, 0.8]\n".into(),
             "line 5: k1",
+        ),
+        (
+            "twin = tanks\n".into(),
+            "line 1: a text without quotes; write it in quotes",
         ),
         (returns.clone(), "line 6, column 4: unknown name \"QQ\""),
         (

@@ -175,12 +175,13 @@ fn measured_equations(
             }
         }
     }
-    // A record at an operating point moves little, far from the twin's start: twice, since the first look is held back by its own prior.
+    // A record at an operating point moves little, far from the twin's start: twice, since the first look is held back by its own prior, and again
+    // as long as a look finds it twice as far.
     let mut reach = sizes.states.clone();
-    for _ in 0..2 {
-        if !starts.unknown.contains(&true) {
-            break;
-        }
+    let (mut looks, mut is_farther) = (0, starts.unknown.contains(&true));
+    while is_farther {
+        looks += 1;
+        is_farther = looks < 2;
         sizes.starts = widths(&reach);
         let loud = built(&sizes);
         let at = loud.begun_loud(&theta);
@@ -191,7 +192,9 @@ fn measured_equations(
             break;
         };
         for ((reach, size), distance) in reach.iter_mut().zip(&sizes.states).zip(distances) {
-            *reach = size.hypot(distance);
+            let farther = size.hypot(distance);
+            is_farther |= farther.is_finite() && farther > 2.0 * *reach;
+            *reach = farther;
         }
     }
     sizes.starts = widths(&reach);

@@ -6,9 +6,9 @@ fn a_grid_that_drifts_has_an_oddest_step() {
     let time = |k: u32| f64::from(k) + 8e-4 * f64::from(k.saturating_sub(100));
     let times: Vec<f64> = (0..200).map(time).collect();
     let drive = Drive::with_times(&times, Signal::zeros((200, 0))).unwrap();
-    assert!(!drive.is_uniform() && drive.oddest_step().is_some());
+    assert!(!drive.is_uniform() && drive.oddest_step(0.1).is_some());
     let even = Drive::autonomous(0.1, 200).unwrap();
-    assert_eq!(even.oddest_step(), None);
+    assert_eq!(even.oddest_step(0.1), None);
 }
 
 #[test]
