@@ -4,7 +4,7 @@ use super::failure::{Failure, InFile};
 use super::options::Subject;
 use super::output;
 use super::shell_word::shown;
-use crate::estimator::Project;
+use crate::estimator::{Estimator, Project};
 use crate::progress::Progress;
 use crate::storage::work::{Ranks, Share};
 use crate::study::{Study, StudyError, StudyFile};
@@ -89,6 +89,33 @@ impl Context<'_> {
             ))),
             _ => Ok(()),
         }
+    }
+
+    /// Loads an estimator; refuses one of another twin, or of another setting, than the call names.
+    pub fn estimator(&self, path: &Path, subject: &Subject) -> Result<Estimator, Failure> {
+        let estimator = Estimator::load(path, self.projects)?;
+        self.check_external_is(estimator.study().name(), "--estimator")?;
+        if subject.twin.is_none() && subject.study.is_none() {
+            return Ok(estimator);
+        }
+        let study = self.study(subject)?;
+        let (made_for, asked) = (estimator.study().name(), study.name());
+        if made_for != asked {
+            return Err(Failure::user(format!(
+                "{}: made for twin {made_for}, the call names {asked}; name the same twin",
+                path.display()
+            )));
+        }
+        if subject.study.is_some() {
+            let [made_for, asked] = [estimator.study(), &study].map(|s| s.manifest("reproduce", 0));
+            if let Some(difference) = asked?.differs(&made_for?) {
+                return Err(Failure::user(format!(
+                    "{}: made for another setting: {difference}; name the study that it was trained with, or the twin alone",
+                    path.display()
+                )));
+            }
+        }
+        Ok(estimator)
     }
 
     /// Returns the share of this process in numbered work: that of `--shard`, or of its rank.

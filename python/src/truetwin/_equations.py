@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
-from ._numbers import number, shown
+import numpy as np
+
+from ._numbers import mapping, number, shown
 from ._simulator import Parameter, Range, ranged
 
 #: An expression: a text such as ``"-k*h + u"``, a number, or an expression of sympy.
@@ -105,6 +108,11 @@ def _sympy(value: Any) -> str:
     return written(value)
 
 
+def _key(name: str) -> str:
+    """Return a key of a TOML file."""
+    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+
+
 def _value(what: str, value: Any) -> str:
     """Return a value of a TOML file; `what` names it in a message."""
     if isinstance(value, bool):
@@ -113,11 +121,11 @@ def _value(what: str, value: Any) -> str:
         # The escapes of JSON are some of TOML's.
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_value(f'{what}, {key}', inner)}" for key, inner in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {_value(f'{what}, {key}', inner)}" for key, inner in value.items()) + " }"
     if isinstance(value, Sequence):
         return "[" + ", ".join(_value(what, inner) for inner in value) + "]"
     real = number(what, value, "give a number or a text")
-    return str(int(real)) if isinstance(value, int) else repr(real)
+    return str(int(real)) if isinstance(value, (int, np.integer)) else repr(real)
 
 
 def _keys(name: str, entry: Mapping[str, Any], expressions: Sequence[str]) -> dict[str, Any]:
@@ -126,12 +134,18 @@ def _keys(name: str, entry: Mapping[str, Any], expressions: Sequence[str]) -> di
     for key, value in entry.items():
         if key in expressions and not isinstance(value, Mapping):
             what = f"{name}, {key}"
-            keys[key] = [expression(what, end) for end in value] if key == "limits" else expression(what, value)
+            keys[key] = _ends(what, value) if key == "limits" else expression(what, value)
         elif isinstance(value, Mapping):
             keys[key] = _keys(f"{name}, {key}", value, ("mean", "std", "value"))
         else:
             keys[key] = value
     return keys
+
+
+def _ends(what: str, value: Any) -> list[str | float]:
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise TypeError(f"{what} = {shown(value)}; give (low, high)")
+    return [expression(what, end) for end in value]
 
 
 def _parameter(name: str, value: Parameter | Range | Mapping[str, Any]) -> dict[str, Any]:
@@ -154,13 +168,13 @@ def tables(entries: Mapping[str, Entry], key: str) -> dict[str, dict[str, Any]]:
 def _table(name: str, entries: Mapping[str, Any]) -> str:
     if not entries:
         return ""
-    return f"[{name}]\n" + "".join(f"{key} = {_value(key, value)}\n" for key, value in entries.items()) + "\n"
+    return f"[{name}]\n" + "".join(f"{_key(key)} = {_value(key, value)}\n" for key, value in entries.items()) + "\n"
 
 
 def _event(event: Mapping[str, Any]) -> str:
     """Return an event as a file has it."""
     keys: dict[str, Any] = {}
-    for key, value in event.items():
+    for key, value in mapping("events: an entry", event, "when or at, and set or add").items():
         if isinstance(value, Mapping):
             keys[key] = {state: expression(f"events: {key}, {state}", inner) for state, inner in value.items()}
         elif isinstance(value, Sequence) and not isinstance(value, str):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -69,9 +70,21 @@ def interval(what: str, value: Any, remedy: str = "give (low, high)") -> tuple[f
     """Return two numbers; refuse anything else."""
     try:
         low, high = value
-        return number(what, low, remedy), number(what, high, remedy)
+        ends = number(what, low, remedy), number(what, high, remedy)
     except (TypeError, ValueError):
         raise ValueError(f"{what} = {shown(value)}; {remedy}") from None
+    if not ends[0] <= ends[1]:
+        raise ValueError(f"{what} = {shown(value)}; {remedy}, low below high")
+    return ends
+
+
+def mapping(what: str, value: Any, of: str) -> Mapping[str, Any]:
+    """Return a dict, an empty one for None; refuse anything else."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{what} of type {type(value).__name__}; give a dict of {of}")
+    return value
 
 
 def reals(values: Any, remedy: str) -> Array:

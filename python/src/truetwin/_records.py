@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._names import Names, Rows, word
-from ._numbers import Array, one_line, reals
+from ._numbers import Array, mapping, one_line, reals
 from ._times import is_timed, seconds
 
 if TYPE_CHECKING:
@@ -70,7 +70,9 @@ class Writer:
         step: float | None,
     ) -> None:
         self._names = names
-        self._columns = columns or {}
+        self._columns = mapping("columns", columns, "name in the twin: column")
+        if odd := [name for name, column in self._columns.items() if not (isinstance(column, str) and column.strip())]:
+            raise ValueError(f"columns: {odd[0]} = {self._columns[odd[0]]!r}; give the name of a column")
         self._inputs = inputs
         self._outputs = outputs
         self._step = step

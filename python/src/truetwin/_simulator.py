@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from ._errors import Diverged
 from ._numbers import Array, interval, number, reals, shown, whole
+from ._records import is_frame
 
 #: What a simulator may return: one output, a tuple or the columns of an array for several, or outputs by name.
 Outputs = Union[npt.ArrayLike, Mapping[str, npt.ArrayLike]]
@@ -141,6 +142,10 @@ class Model:
         names = list(self.outputs)
         if result is None:
             raise ValueError("the simulator returned None; end it with `return` and its outputs")
+        if is_frame(result):
+            # Columns without names are numbered.
+            given = list(result.columns)
+            result = result.to_numpy() if given == list(range(len(given))) else dict(result.items())
         if isinstance(result, Mapping):
             if set(result) != set(names):
                 raise ValueError(f"the simulator returned the outputs {_list(result)}; return {_list(names)}")

@@ -14,7 +14,7 @@ from . import _process, _records
 from ._equations import Entry, Expression, Text, is_expression
 from ._errors import TruetwinError
 from ._names import Names, word
-from ._numbers import Array, count, number, whole
+from ._numbers import Array, count, mapping, number, whole
 from ._points import Equation, PointModel, States
 from ._records import Record, Records
 from ._report import Report
@@ -74,7 +74,7 @@ class Twin:
         Number of samples of simulated records.
     levels : (low, high), or dict of str to (low, high), dict, float or path, optional
         Inputs of simulated records. A range: each input a staircase of random levels. By input: such a range, or
-        ``{"levels": (low, high), "hold": n}``; a constant; or, for equations, the path of a CSV file that has the column.
+        ``{"levels": (low, high), "hold": n}``; a constant; or, for equations as texts, the path of a CSV file that has the column.
     hold : int, optional
         Number of samples for which a random input is held.
     name : str, optional
@@ -123,6 +123,14 @@ class Twin:
         threads: int | None = None,
         timeout: float = 60.0,
     ) -> None:
+        parameters = mapping("parameters", parameters, "name: (low, high)")
+        constants, define = mapping("constants", constants, "name: number"), mapping("define", define, "name: expression")
+        record = mapping("record", record, "keys")
+        inputs = () if inputs is None else inputs
+        if isinstance(events, Mapping):
+            raise TypeError("events of type dict; give a list of dicts")
+        if not (name is None or isinstance(name, str)):
+            raise TypeError(f"name of type {type(name).__name__}; give a text")
         self._study = study
         self._threads = None if threads is None else count("threads", threads, 1)
         self._workers = count("workers", workers, 1)
@@ -142,17 +150,20 @@ class Twin:
             plan: dict[str, Any] = {} if step is None else {"step": seconds("step", step), "samples": samples}
             if levels is not None:
                 plan["input"] = planned(levels, hold)
-            plan |= record or {}
+                files = [of for of, own in plan["input"].items() if isinstance(own, str)]
+                if files and (drift or observe):
+                    raise ValueError(f"levels: {files[0]} is a file, which equations as texts take; give (low, high) or a number")
+            plan |= record
             levels_of_noise = _noise_levels(noise, outputs, _names_of(states), expressions=True)
             moving, shown = _noisy(states, levels_of_noise, "rate", drift), _noisy(outputs, levels_of_noise, "value", observe)
             if drift or observe:
                 if events:
                     raise ValueError("events belong to equations as text; give states={name: rate}, and no drift or observe")
-                self._model = PointModel(drift, observe, parameters, moving, inputs, shown, constants or {}, define or {}, plan, name)
+                self._model = PointModel(drift, observe, parameters, moving, inputs, shown, constants, define, plan, name)
                 self.name = self._model.name
                 return
             units = inputs if isinstance(inputs, Mapping) else _units(inputs)
-            self._text = Text(name or "twin", parameters, moving, units, shown, constants or {}, define or {}, events, plan)
+            self._text = Text(name or "twin", parameters, moving, units, shown, constants, define, events, plan)
             self.name = self._text.name
             return
         if drift or observe:
@@ -274,7 +285,7 @@ class Twin:
             options += ["--quick"] * quick + ["--step-of-record"] * step_of_record
             if validation is not None:
                 options += ["--validation", call.record("validation", validation, columns)]
-            excluded = [without] if isinstance(without, str) else list(without or ())
+            excluded = [without] if isinstance(without, str) else _texts("without", without or ())
             if isinstance(self._model, Model) and not self._model.takes_seed and self._study is None:
                 # The noise level of such a twin is fitted in every hypothesis. As an effect it would count twice, and be a gap.
                 excluded.append("sensor-noise")
@@ -348,6 +359,8 @@ class Twin:
         """
         with _Call(self) as call:
             options = [call.record("record", record, columns), *call.columns(columns), "--estimator", word(estimator)]
+            # An estimator of other equations would answer, too.
+            options += call.subject(noise=True) if self._model is None else []
             if validation is not None:
                 options += ["--validation", call.record("validation", validation, columns)]
             options += ["--always-refine"] * always_refine + ["--step-of-record"] * step_of_record
@@ -392,7 +405,8 @@ class Twin:
             The record; a DataFrame if `inputs` is one.
         """
         with _Call(self) as call:
-            values = {name: number(f"parameters: {name}", value, "give a number") for name, value in parameters.items()}
+            given = mapping("parameters", parameters, "name: number")
+            values = {name: number(f"parameters: {name}", value, "give a number") for name, value in given.items()}
             theta = ",".join(f"{name}={value!r}" for name, value in values.items())
             file = call.path / "simulated.csv"
             options = [*call.subject(noise=True), "--theta", theta, "--out", str(file)]
@@ -512,11 +526,7 @@ class _Call:
 
     def columns(self, columns: Mapping[str, str] | None) -> list[str]:
         """Return the option that names columns."""
-        if not columns:
-            return []
-        if odd := [name for name, column in columns.items() if not (isinstance(column, str) and column.strip())]:
-            raise ValueError(f"columns: {odd[0]} = {columns[odd[0]]!r}; give the name of a column")
-        return ["--columns", _records.columns_of(columns)]
+        return ["--columns", _records.columns_of(columns)] if columns else []
 
     def subject(self, noise: bool = False) -> list[str]:
         """Return the options that name the twin."""
@@ -564,6 +574,14 @@ class _Call:
         """Run a verb that fills a folder; return the folder and what it prints."""
         folder = self.path / "result" if out is None else Path(out)
         return folder, self.run(verb, [*options, "--out", word(folder)], seed)
+
+
+def _texts(what: str, value: Any) -> list[str]:
+    """Return a list of texts; refuse anything else."""
+    texts = value if isinstance(value, Sequence) else None
+    if texts is None or not all(isinstance(text, str) for text in texts):
+        raise TypeError(f"{what} = {value!r}; give a text or a list of texts")
+    return list(texts)
 
 
 def _names_of(entries: States) -> list[str]:

@@ -3,7 +3,7 @@
 use crate::cli::posterior::{self, PosteriorDraws};
 use crate::cli::prelude::*;
 use crate::estimator::bank::file;
-use crate::estimator::{self, EstimateOptions, Estimator, EstimatorError};
+use crate::estimator::{self, EstimateOptions, EstimatorError};
 use crate::record::Record;
 use crate::report::{Report, overlay_svg, together_document, together_json, trajectories_csv};
 
@@ -20,6 +20,9 @@ pub(in crate::cli) struct Estimate {
     /// Estimator from `truetwin pretrain`.
     #[arg(long, value_name = "EST")]
     estimator: PathBuf,
+    /// The estimator's own by default; where the call names one, the estimator must be of that.
+    #[command(flatten)]
+    subject: Subject,
     #[command(flatten)]
     columns: FileColumns,
     /// Second record of the same system, to score the calibrated twin.
@@ -44,9 +47,8 @@ pub(in crate::cli) struct Estimate {
 impl Verb for Estimate {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let folder = output::asked_folder(&self.out)?;
-        let estimator = Estimator::load(&self.estimator, context.projects)?;
+        let estimator = context.estimator(&self.estimator, &self.subject)?;
         let study = estimator.study();
-        context.check_external_is(study.name(), "--estimator")?;
         let reader = self.columns.reader(study);
         let (records, validation) =
             records::read(reader, &self.records, self.validation.as_deref())?;

@@ -108,7 +108,7 @@ impl Verb for Reproduce {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let project = context.project(&self.subject)?;
         let given = (self.estimator.as_ref())
-            .map(|path| load(context, path, project.study(), self.subject.study.is_some()))
+            .map(|path| context.estimator(path, &self.subject))
             .transpose()?;
         // An estimator carries the setting that it was made for.
         let study = (given.as_ref()).map_or(project.study(), Estimator::study);
@@ -175,33 +175,6 @@ impl Verb for Reproduce {
         };
         provenance.deliver(context, &json, write, || text.clone())
     }
-}
-
-/// Loads an estimator; refuses one of another twin, and of another setting where the call names one.
-fn load(
-    context: &Context<'_>,
-    path: &Path,
-    study: &Study,
-    is_set: bool,
-) -> Result<Estimator, Failure> {
-    let estimator = Estimator::load(path, context.projects)?;
-    let (made_for, asked) = (estimator.study().name(), study.name());
-    if made_for != asked {
-        return Err(Failure::user(format!(
-            "{}: made for twin {made_for}, the call names {asked}; name the same twin",
-            path.display()
-        )));
-    }
-    if is_set {
-        let [made_for, asked] = [estimator.study(), study].map(|s| s.manifest("reproduce", 0));
-        if let Some(difference) = asked?.differs(&made_for?) {
-            return Err(Failure::user(format!(
-                "{}: made for another setting: {difference}; name the study that it was trained with, or the twin alone",
-                path.display()
-            )));
-        }
-    }
-    Ok(estimator)
 }
 
 /// Loads the folder's estimator; trains it first if needed.
