@@ -74,8 +74,11 @@ def test_numbers_that_mean_nothing_are_refused(twin, record):
 
 
 def test_a_wrong_description_is_named():
-    twisted = truetwin.Twin(heater, **{**SETTING, "parameters": {"gain": (3.0, 1.0)}})
-    with pytest.raises(truetwin.TruetwinError, match=r"the program `heater` .*invalid interval \[3, 1\]"):
+    for wrong, part in [({"gain": (3.0, 1.0)}, "gain = .*low below high"), ({"gain": (float("nan"), 1.0)}, "gain"), (["gain"], "a dict of")]:
+        with pytest.raises((ValueError, TypeError), match=f"parameters.*{part}"):
+            truetwin.Twin(heater, **{**SETTING, "parameters": wrong})
+    twisted = truetwin.Twin(heater, **{**SETTING, "parameters": {"gain": (1.0, 1.0)}})
+    with pytest.raises(truetwin.TruetwinError, match=r"the program `heater` .*invalid interval \[1, 1\]"):
         twisted.simulate({"gain": 2.0})
 
 

@@ -232,3 +232,29 @@ def test_the_example_of_the_readme(tmp_path, record, monkeypatch):
     exec(compile(example, "README.md", "exec"), spaces)
     assert spaces["diagnosis"].verdict in ("no-gap", "parameter-gap", "structural-gap")
     assert json.dumps(spaces["diagnosis"].raw)
+
+
+def test_outputs_of_a_frame_go_by_name():
+    def rig(parameters, inputs, time):
+        return pd.DataFrame({"speed": 0 * time + 2.0, "angle": parameters["a"] * time})
+
+    twin = truetwin.Twin(rig, parameters={"a": (0.5, 2.0)}, outputs=["angle", "speed"], step=0.1, samples=4)
+    record = twin.simulate({"a": 1.0})
+    assert list(record["speed"]) == [2.0] * 4 and record["angle"][3] == pytest.approx(0.3)
+
+
+def test_an_estimator_is_that_of_its_equations(tmp_path):
+    def lag(rate, name="lag"):
+        return truetwin.Twin(
+            name=name, parameters={"τ": (0.5, 1.0)}, states={"θ": {"rate": rate, "start": 0.0}}, inputs=["push"],
+            outputs={"y": {"value": "θ", "noise": 0.02}}, step=0.1, samples=np.int64(40), levels=(-1, 1), record={"substeps": np.int64(2)},
+        )  # fmt: skip
+
+    own = lag("(push - θ)/τ")
+    estimator = own.pretrain(tmp_path / "lag.est", bank_size=200, epochs=1)
+    record = own.simulate({"τ": 0.7})
+    assert 0.5 < own.estimate(record, estimator).parameters["τ"] < 1.0
+    with pytest.raises(truetwin.TruetwinError, match="made for another setting"):
+        lag("(push - θ)/(3*τ)").estimate(record, estimator)
+    with pytest.raises(truetwin.TruetwinError, match="made for twin lag"):
+        lag("(push - θ)/τ", "other").estimate(record, estimator)

@@ -6,7 +6,7 @@ use crate::storage::untrusted::{one_line, short_words};
 use crate::storage::work::Ranks;
 use crate::study::StudyError;
 use std::fmt::{self, Display, Formatter};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Most characters of a message: it may quote what was given.
@@ -65,6 +65,22 @@ impl Failure {
             },
             _ => failure,
         }
+    }
+
+    /// Creates the failure of one of several records as that of its file, and as `whole` any other.
+    pub fn of_records(
+        error: StudyError,
+        whole: impl FnOnce(StudyError) -> Self,
+        records: &[PathBuf],
+        validation: Option<&PathBuf>,
+    ) -> Self {
+        let path = error.culprit(records, validation);
+        let failure = match error {
+            StudyError::Channels { error, .. } => Self::from(error),
+            other => whole(other),
+        };
+        path.into_iter()
+            .fold(failure, |failure, path| failure.within(path))
     }
 
     /// Creates the failure of a wrong call, in one line with the remedy.

@@ -363,8 +363,7 @@ fn a_record_whose_steps_vary_is_named() {
         let output = call.current_dir(at).output().unwrap();
         let line = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{line}");
-        let part =
-            "record 2 does not fit the twin: row 5, column t: a step of 0.15 s in place of 0.1 s";
+        let part = "odd.csv: row 5, column t: a step of 0.15 s in place of 0.1 s";
         assert!(line.contains(part), "{line}");
     }
 }

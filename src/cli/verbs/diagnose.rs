@@ -80,10 +80,8 @@ impl Verb for Diagnose {
             context.progress,
         )
         .map_err(|error| {
-            let path = error.culprit(&self.records, self.validation.as_ref());
-            let failure = Failure::diagnosis(error);
-            path.into_iter()
-                .fold(failure, |failure, path| failure.within(path))
+            let validation = self.validation.as_ref();
+            Failure::of_records(error, Failure::diagnosis, &self.records, validation)
         })?;
         let provenance = Provenance::new(context)
             .files("record", &self.records)

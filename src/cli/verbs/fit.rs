@@ -45,7 +45,8 @@ impl Verb for Fit {
             ..FitSettings::default()
         };
         stop::let_end();
-        let fit = study.fit_with(&records, &settings, context.progress)?;
+        let fit = study.fit_with(&records, &settings, context.progress);
+        let fit = fit.map_err(|e| Failure::of_records(e, Failure::from, &self.records, None))?;
         let provenance = Provenance::new(context).files("record", &self.records);
         let json = provenance.on(fit.json(&study));
         let write = || {

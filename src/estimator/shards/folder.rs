@@ -171,8 +171,11 @@ impl Shards {
 
     fn incomplete(&self) -> EstimatorError {
         let (there, of) = (self.there.len(), self.of);
-        let problem =
-            format!("{there} of {of} shards are there; make the same bank again to add the others");
+        let missing = (0..of).find(|number| !self.there.contains_key(number));
+        let problem = format!(
+            "{there} of {of} shards are there, {} is missing; make the same bank again to add the others",
+            missing.unwrap_or_default()
+        );
         EstimatorError::NoBank {
             path: self.folder.path().into(),
             problem,

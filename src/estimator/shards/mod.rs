@@ -23,6 +23,7 @@ use crate::estimator::error::EstimatorError;
 use crate::estimator::project::{PresetName, Project};
 use crate::estimator::settings::MOST_SIMULATIONS;
 use crate::progress::Progress;
+use crate::setting::number;
 use crate::storage::files::write_result;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use folder::{SHARDS, Shards, VERB, conflict, rows_of_a_shard};
@@ -76,8 +77,9 @@ impl BankPlan {
     ) -> Result<Filled, EstimatorError> {
         if !(1..=MOST_SIMULATIONS).contains(&self.size) {
             return Err(EstimatorError::Bank(format!(
-                "a bank of {} simulations; choose between 1 and {MOST_SIMULATIONS}",
-                self.size
+                "a bank of {} simulations; choose between 1 and {}",
+                number(self.size as f64),
+                number(MOST_SIMULATIONS as f64)
             )));
         }
         let features = &self.project.recipe(self.preset).features;

@@ -24,8 +24,20 @@ pub(super) enum Archive {
 
 /// Unpacks an FMU into a temporary folder and reads its description, that of its own steps where `stepped` asks for them.
 pub(super) fn open(path: &Path, stepped: bool) -> Result<(ModelDescription, TempDir), StudyError> {
-    let at = |problem: String| refused(path, format!("no usable FMU: {problem}; export it again"));
+    let at = |problem: String| {
+        // Some problems say how it is to be exported.
+        let again = if problem.contains("; export it") {
+            ""
+        } else {
+            "; export it again"
+        };
+        refused(path, format!("no usable FMU: {problem}{again}"))
+    };
     let file = File::open(path).map_err(|error| refused(path, with_remedy(&error)))?;
+    if path.is_dir() {
+        let error = std::io::ErrorKind::IsADirectory.into();
+        return Err(refused(path, with_remedy(&error)));
+    }
     let folder = tempfile::Builder::new().prefix("truetwin-fmu-").tempdir();
     let folder = folder.map_err(|error| at(format!("no temporary folder: {error}")))?;
     unpack(file, folder.path(), MOST_BYTES).map_err(at)?;

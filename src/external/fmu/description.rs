@@ -173,7 +173,7 @@ impl ModelDescription {
             .collect();
         if let Some(name) = names.iter().find(|name| !known.contains(name)) {
             return Err(format!(
-                "no real parameter, input or output is called {name}; there are {}",
+                "no real parameter, input or output is called \"{name}\"; there are {}",
                 known.join(", ")
             ));
         }
