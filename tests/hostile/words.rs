@@ -237,7 +237,7 @@ fn columns_have_the_names_of_the_file() {
         &["same.csv: level: an input file"],
     );
     for columns in [
-        "push = \"level\"",
+        "push = \"y\"",
         "t = \"time\"\npush = \"time\"",
         "push = \" \"",
     ] {

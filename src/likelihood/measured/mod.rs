@@ -130,6 +130,34 @@ fn without_effects(space: &ParameterSpace, beliefs: &Beliefs) -> Vec<f64> {
         .collect()
 }
 
+/// Widths of starts as two looks from these find them: the first is held back by its own prior. `None` where the twin cannot be smoothed.
+fn looked(
+    from: Vec<f64>,
+    sizes: &mut RecordSizes,
+    (widths, built): (
+        &impl Fn(&[f64]) -> Vec<Option<f64>>,
+        &impl Fn(&RecordSizes) -> Measured,
+    ),
+    (records, theta): (&[Record], &[f64]),
+) -> Result<Option<Vec<f64>>, FilterError> {
+    let mut reach = from;
+    for _ in 0..2 {
+        sizes.starts = widths(&reach);
+        let loud = built(sizes);
+        let at = loud.begun_loud(theta);
+        let Some(twin) = loud.twin.equations() else {
+            return Ok(None);
+        };
+        let Some(distances) = distances(twin, records, &at)? else {
+            return Ok(None);
+        };
+        for ((reach, size), distance) in reach.iter_mut().zip(&sizes.states).zip(distances) {
+            *reach = size.hypot(distance);
+        }
+    }
+    Ok(Some(reach))
+}
+
 fn measured_equations(
     base: &Composed,
     records: &[Record],
@@ -175,26 +203,23 @@ fn measured_equations(
             }
         }
     }
-    // A record at an operating point moves little, far from the twin's start: twice, since the first look is held back by its own prior, and again
-    // as long as a look finds it twice as far.
+    // A record at an operating point moves little, far from the twin's start; a look from a width that is too small for its first row finds nothing.
+    // Where none explains the first rows, something else does.
     let mut reach = sizes.states.clone();
-    let (mut looks, mut is_farther) = (0, starts.unknown.contains(&true));
-    while is_farther {
-        looks += 1;
-        is_farther = looks < 2;
-        sizes.starts = widths(&reach);
-        let loud = built(&sizes);
-        let at = loud.begun_loud(&theta);
-        let Some(twin) = loud.twin.equations() else {
+    // Twelve decades are pascals beside micropascals.
+    let decades = (0..=12).take_while(|_| starts.unknown.contains(&true));
+    for decades in decades {
+        let wide = 10f64.powi(decades);
+        let from: Vec<f64> = sizes.states.iter().map(|size| wide * size).collect();
+        let Some(found) = looked(from, &mut sizes, (&widths, &built), (records, &theta))? else {
             break;
         };
-        let Some(distances) = distances(twin, records, &at)? else {
+        let is_explained = starts.explain(base, records, &theta, &found);
+        if decades == 0 || is_explained {
+            reach = found;
+        }
+        if is_explained {
             break;
-        };
-        for ((reach, size), distance) in reach.iter_mut().zip(&sizes.states).zip(distances) {
-            let farther = size.hypot(distance);
-            is_farther |= farther.is_finite() && farther > 2.0 * *reach;
-            *reach = farther;
         }
     }
     sizes.starts = widths(&reach);

@@ -56,7 +56,7 @@ impl Starts {
         for (r, record) in (records.iter().enumerate()).filter(|_| !beliefs.trusts_code) {
             // Of records that begin at 0, the study's own word stands; at another time, it may be that of a start before the record.
             let stands = record.drive().first_time() == 0.0 || twin.begins().is_some();
-            let Some(found) = contradiction((twin, &unknown), record, theta) else {
+            let Some(found) = contradiction((twin, &unknown), &[], record, theta) else {
                 continue;
             };
             let (held, given_up): (Vec<usize>, Vec<usize>) = (0..names.len())
@@ -88,6 +88,23 @@ impl Starts {
         }
         Self { unknown, elsewhere }
     }
+
+    /// Returns whether unknown starts of these widths explain the first rows.
+    pub fn explain(
+        &self,
+        twin: &Composed,
+        records: &[Record],
+        theta: &[f64],
+        widths: &[f64],
+    ) -> bool {
+        let known = vec![false; self.unknown.len()];
+        let unknown = self.unknown.iter().zip(widths);
+        let widths: Vec<f64> = unknown
+            .map(|(is, width)| if *is { *width } else { 0.0 })
+            .collect();
+        let mut first = records.iter();
+        first.all(|record| contradiction((twin, &known), &widths, record, theta).is_none())
+    }
 }
 
 /// A value in the first row at which no θ within the bounds starts.
@@ -100,8 +117,10 @@ struct Contradiction {
     shows: Vec<bool>,
 }
 
+/// The first one, of states whose starts are `unknown`, or wider than the twin says by `widths`, where these are given.
 fn contradiction(
     (twin, unknown): (&Composed, &[bool]),
+    widths: &[f64],
     record: &Record,
     theta: &[f64],
 ) -> Option<Contradiction> {
@@ -140,7 +159,7 @@ fn contradiction(
                 twin.readout(&now, &mut there);
                 there
             };
-            let reach = MEASURED.elsewhere * std[i];
+            let reach = MEASURED.elsewhere * std[i].hypot(widths.get(i).copied().unwrap_or(0.0));
             for (reach, is_likely) in [(reach, true), (-reach, true), (1.0, false), (-1.0, false)] {
                 let there = read(reach);
                 for j in 0..p {

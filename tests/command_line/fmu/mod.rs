@@ -266,7 +266,7 @@ fn what_is_no_fmu_is_named() {
     assert!(
         error
             .to_string()
-            .contains("called inertia; there are stiffness"),
+            .contains("called \"inertia\"; there are stiffness"),
         "{error}"
     );
 }
