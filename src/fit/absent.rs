@@ -42,7 +42,7 @@ impl WithoutEffects {
     pub(super) fn reach_off(
         &self,
         problem: &Problem,
-        (fitted, level): (&Fitted, f64),
+        (fitted, level, gained): (&Fitted, f64, Option<f64>),
         values: &mut [FittedValue],
     ) -> Result<(), FilterError> {
         let space = problem.twin.parameters();
@@ -51,7 +51,12 @@ impl WithoutEffects {
             let Some((j, at)) = entry.zip(self.off(problem, &value.name)) else {
                 continue;
             };
+            let off = self.magnitudes[&value.name].off.unwrap_or(at);
             if value.low <= at && value.high >= at {
+                // The end of what was looked for is no end where nothing is felt there.
+                if gained.is_some_and(|gained| gained < 0.0) {
+                    (value.low, value.high) = (value.low.min(off), value.high.max(off));
+                }
                 continue;
             }
             let mut theta = fitted.theta.clone();
@@ -59,7 +64,6 @@ impl WithoutEffects {
             let there = climb(&problem.holding(|i| i == j), &theta, ITERATIONS)?;
             let lost = |there: Fitted| fitted.log_likelihood - there.log_likelihood;
             if there.is_some_and(|there| lost(there) <= depth(level)) {
-                let off = self.magnitudes[&value.name].off.unwrap_or(at);
                 (value.low, value.high) = (value.low.min(off), value.high.max(off));
             }
         }

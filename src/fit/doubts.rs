@@ -4,6 +4,7 @@ use super::follow::Swallowed;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
 use super::searched::WithoutEffects;
+use crate::effect::Magnitude;
 use crate::likelihood::{StartElsewhere, rounded};
 use crate::math::{is_constant, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
@@ -282,15 +283,21 @@ impl<'a> Doubts<'a> {
         }
     }
 
-    /// Warns of parameters, magnitudes and noise levels at a bound.
+    /// Warns of parameters, magnitudes and noise levels at a bound, and of effects that gain nothing.
     pub fn bounds(
         &mut self,
         parameters: &[FittedValue],
         noise: &[FittedNoise],
-        without: Option<&WithoutEffects>,
+        (without, gained): (Option<&WithoutEffects>, Option<f64>),
     ) {
         let off = |p: &FittedValue| without?.off(self.problem, &p.name);
-        let is_off = |p: &FittedValue| off(p) == Some(p.value);
+        // At the end of what records show, a threshold may well be felt.
+        let is_felt = gained.is_some_and(|gained| gained > 0.0);
+        let is_off = |p: &FittedValue| {
+            let magnitude = without.and_then(|without| without.magnitudes.get(&p.name));
+            let is_end = magnitude.is_some_and(Magnitude::is_threshold);
+            off(p) == Some(p.value) && !(is_end && is_felt)
+        };
         let effect = |p: &FittedValue| p.name.rsplit_once('.').map(|(effect, _)| effect.to_owned());
         for p in parameters {
             let Some(side) = p.at_bound else { continue };
@@ -324,10 +331,11 @@ impl<'a> Doubts<'a> {
             }
             self.all.push(doubt);
         }
+        self.effects(gained);
     }
 
     /// Warns of effects that gain no evidence, unless one of them is [off](Self::bounds) or the [search](Self::search) has not arrived.
-    pub fn effects(&mut self, gained: Option<f64>) {
+    fn effects(&mut self, gained: Option<f64>) {
         let speaks = |doubt: &Warning| doubt.remedy == LEAVE_OUT || doubt.code == NOT_CONVERGED;
         let is_told = self.all.iter().any(speaks);
         if let Some(gained) = gained.filter(|gained| *gained < 0.0 && !is_told) {

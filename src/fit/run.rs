@@ -58,6 +58,7 @@ pub(crate) fn run(
         return Ok(None);
     };
     let evidence = weighed(&problem, (&fitted, &draws, without.as_ref()), stages, noise)?;
+    let gained = evidence.and_then(|evidence| evidence.gained);
     let spread = FitIntervals::new(&problem, &fitted, &draws.thetas, settings.level);
     let (mut parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
     let arrived = arrived && certificate.has_converged();
@@ -67,7 +68,7 @@ pub(crate) fn run(
     })?;
     let profiles = stated(&problem, without.as_ref(), profiled, &mut parameters);
     if let Some(without) = without.as_ref().filter(|_| !problem.is_simulated()) {
-        let at = (&fitted, settings.level);
+        let at = (&fitted, settings.level, gained);
         stages.of((), || without.reach_off(&problem, at, &mut parameters))?;
     }
     let FollowedRecords {
@@ -100,8 +101,7 @@ pub(crate) fn run(
     doubts.below(alone.filter(|_| !ends), fitted.log_likelihood);
     doubts.search(&convergence, by_step);
     doubts.start(measured.elsewhere.as_ref());
-    doubts.bounds(&parameters, &noise_levels, without.as_ref());
-    doubts.effects(evidence.and_then(|evidence| evidence.gained));
+    doubts.bounds(&parameters, &noise_levels, (without.as_ref(), gained));
     doubts.runs(&errors, by_step);
     doubts.swallowed(stages.of(None, || swallowed(&problem, &fitted, levels, &errors))?);
     doubts.rounded();
@@ -161,8 +161,8 @@ fn told(starts: &[FittedStart]) -> impl Fn(&str) -> Option<(f64, f64)> {
     }
 }
 
-/// States intervals that hold both that of the posterior and that of the profile, for the named parameters; a side without an end reaches to the bound,
-/// of a magnitude to where its law ends.
+/// States intervals that hold both that of the posterior and that of the profile, for the named parameters; a side without an end reaches to the bound of
+/// what was looked for, or to where the law of a magnitude ends.
 fn stated(
     problem: &Problem,
     without: Option<&WithoutEffects>,
@@ -172,8 +172,13 @@ fn stated(
     let space = problem.twin.parameters();
     for value in parameters.iter_mut().filter(|v| named.contains(&v.name)) {
         let own = profiles.iter().find(|profile| profile.name == value.name);
-        let law = without.and_then(|without| Some(without.magnitudes.get(&value.name)?.limits));
-        let bounds = law.or((space.iter().find(|p| p.name == value.name)).map(|p| p.bounds));
+        let bounds = space.position(&value.name).ok().map(|j| {
+            let (shown, own) = (problem.axes[j].bounds, space[j].bounds);
+            match without.and_then(|without| without.magnitudes.get(&value.name)) {
+                Some(m) if shown == own => m.limits,
+                _ => shown,
+            }
+        });
         if let Some((own, bounds)) = own.zip(bounds) {
             value.low = own.low.unwrap_or(bounds.low()).min(value.low);
             value.high = own.high.unwrap_or(bounds.high()).max(value.high);
