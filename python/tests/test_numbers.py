@@ -120,7 +120,7 @@ def test_wrong_whole_numbers_are_named(twin, record, tmp_path, value):
 def test_wrong_numbers_of_other_arguments_are_named(twin, record):
     inputs = {"t": record["t"], "power": record["power"]}
     refused("parameters: gain = 'a'; give a number", lambda: twin.simulate({"gain": "a", "tau": 10}, inputs))
-    refused("parameters: no value for tau; give gain, tau", lambda: twin.simulate({"gain": 2}, inputs))
+    refused("parameters: no value for tau; give tau", lambda: twin.simulate({"gain": 2}, inputs))
     refused("seed = None; give a whole number, from 0 to", lambda: twin.fit(record, seed=None))
     for name in ("step", "timeout"):
         for value in ("x", float("nan"), 0, True, 1j):
