@@ -91,14 +91,18 @@ impl Context<'_> {
         }
     }
 
-    /// Loads an estimator; refuses one of another twin, or of another setting, than the call names.
-    pub fn estimator(&self, path: &Path, subject: &Subject) -> Result<Estimator, Failure> {
+    /// Loads an estimator; refuses one of another twin, or where the call has a study, of another setting, than the one that is asked for, if one is.
+    pub fn estimator(
+        &self,
+        path: &Path,
+        asked: Option<&Study>,
+        subject: &Subject,
+    ) -> Result<Estimator, Failure> {
         let estimator = Estimator::load(path, self.projects)?;
         self.check_external_is(estimator.study().name(), "--estimator")?;
-        if subject.twin.is_none() && subject.study.is_none() {
+        let Some(study) = asked else {
             return Ok(estimator);
-        }
-        let study = self.study(subject)?;
+        };
         let (made_for, asked) = (estimator.study().name(), study.name());
         if made_for != asked {
             return Err(Failure::user(format!(
@@ -107,7 +111,7 @@ impl Context<'_> {
             )));
         }
         if subject.study.is_some() {
-            let [made_for, asked] = [estimator.study(), &study].map(|s| s.manifest("reproduce", 0));
+            let [made_for, asked] = [estimator.study(), study].map(|s| s.manifest("reproduce", 0));
             if let Some(difference) = asked?.differs(&made_for?) {
                 return Err(Failure::user(format!(
                     "{}: made for another setting: {difference}; name the study that it was trained with, or the twin alone",

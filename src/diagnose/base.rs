@@ -81,15 +81,10 @@ impl Base {
             let mut searched = searched(&measured, &effects, records, starts, passes)?;
             let problem = searched.problem;
             if let Some((theta, best)) = initial.as_ref().zip(searched.fits.first()) {
-                let start = problem.clamp(&problem.full(theta)).into_iter().enumerate();
-                let held = |(j, value): (usize, f64)| {
-                    if problem.axes[j].held {
-                        best.theta[j]
-                    } else {
-                        value
-                    }
-                };
-                let start: Vec<f64> = start.map(held).collect();
+                let mut start = problem.clamp(&problem.full(theta));
+                for j in (0..start.len()).filter(|&j| problem.axes[j].held) {
+                    start[j] = best.theta[j];
+                }
                 searched.fits.extend(climb(&problem, &start, ITERATIONS)?);
             }
             descending(&mut searched.fits, |fit| fit.objective);

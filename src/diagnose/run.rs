@@ -171,12 +171,7 @@ fn check(
     let measured = (records.iter().enumerate()).map(|(i, record)| (Some(i), record));
     let held_out = validation.map(|record| (None, record));
     for (which, record) in measured.chain(held_out) {
-        (record.check_channels(&study.twin().signals()))
-            .and_then(|()| study.twin().check_drive(record.drive()))
-            .map_err(|error| StudyError::Channels {
-                record: which,
-                error,
-            })?;
+        study.check_one_of(which, record)?;
         let given = record.drive().dt();
         let uniform = first.drive().is_uniform() && record.drive().is_uniform();
         if uniform && (given - expected).abs() > 1e-3 * expected {

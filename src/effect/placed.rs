@@ -150,7 +150,7 @@ impl Effect {
 
     /// Returns the names in θ of magnitudes at which it can be off, and where each is.
     pub(crate) fn off(&self) -> impl Iterator<Item = (String, f64)> + '_ {
-        (self.magnitudes().iter()).filter_map(|m| Some((self.key.magnitude(m.name), m.off?)))
+        (self.named_magnitudes()).filter_map(|(name, m)| Some((name, m.off?)))
     }
 
     /// Returns the names in θ of all magnitudes, with what each is.

@@ -148,9 +148,8 @@ pub(crate) fn drive_csv_text(drive: &Drive, signals: &Signals) -> String {
 
 /// The text of a record file; reading it gives the same bits of u and y, and of t where steps vary. A missing output is an empty cell.
 pub(crate) fn record_csv_text(record: &Record) -> String {
-    let (inputs, outputs) = (record.drive().inputs(), record.outputs());
-    let header = columns(inputs.ncols(), outputs.ncols());
-    csv_text(&header, record.drive(), outputs)
+    let inputs = record.drive().inputs().ncols();
+    named_csv_text(record, &columns(inputs, record.outputs().ncols()))
 }
 
 /// As [`record_csv_text`], with names of the columns: time, inputs, outputs.

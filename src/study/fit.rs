@@ -69,10 +69,7 @@ impl Study {
     ) -> Result<Fit, StudyError> {
         SettingError::unless_level("level", settings.level, 0.9)?;
         for (index, record) in records.iter().enumerate() {
-            (self.check_channels(record)).map_err(|error| StudyError::Channels {
-                record: Some(index),
-                error,
-            })?;
+            self.check_one_of(Some(index), record)?;
         }
         Record::check_outputs(records, &self.twin.signals().outputs)?;
         let clock = Instant::now();

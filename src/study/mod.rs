@@ -372,6 +372,18 @@ impl Study {
         Ok(record.check_complete()?)
     }
 
+    /// As [`check_channels`](Self::check_channels), of one of several records, or of the validation record.
+    pub(crate) fn check_one_of(
+        &self,
+        which: Option<usize>,
+        record: &Record,
+    ) -> Result<(), StudyError> {
+        (self.check_channels(record)).map_err(|error| StudyError::Channels {
+            record: which,
+            error,
+        })
+    }
+
     /// Checks that a record has the channels of this study, and steps that its twin can take.
     pub(crate) fn check_channels(&self, record: &Record) -> Result<(), RecordError> {
         record.check_channels(&self.twin.signals())?;

@@ -47,7 +47,9 @@ pub(in crate::cli) struct Estimate {
 impl Verb for Estimate {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let folder = output::asked_folder(&self.out)?;
-        let estimator = context.estimator(&self.estimator, &self.subject)?;
+        let is_named = self.subject.twin.is_some() || self.subject.study.is_some();
+        let named = is_named.then(|| context.study(&self.subject)).transpose()?;
+        let estimator = context.estimator(&self.estimator, named.as_ref(), &self.subject)?;
         let study = estimator.study();
         let reader = self.columns.reader(study);
         let (records, validation) =

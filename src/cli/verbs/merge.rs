@@ -26,12 +26,13 @@ const FILES: [&str; 8] = ["csv", "gz", "json", "npy", "npz", "parquet", "txt", "
 
 impl Verb for Merge {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        match file::is_named(&self.out) {
+        let is_file = file::is_named(&self.out);
+        match is_file {
             true => output::check_new_file(&self.out)?,
             false => output::check_new(&self.out)?,
         }
         let ending = self.out.extension().unwrap_or_default().to_string_lossy();
-        if FILES.contains(&&*ending.to_lowercase()) && !file::is_named(&self.out) {
+        if FILES.contains(&&*ending.to_lowercase()) && !is_file {
             return Err(Failure::user(format!(
                 "{}: a file of a bank ends with .npz or .csv; name it so, or a folder without such an ending",
                 self.out.display()
@@ -39,7 +40,7 @@ impl Verb for Merge {
         }
         let out = shown(&self.out);
         let progress = context.progress;
-        let (what, merged) = match file::is_named(&self.out) {
+        let (what, merged) = match is_file {
             true => (
                 "simulation",
                 merge_into_file(&self.from, &self.out, progress)?,

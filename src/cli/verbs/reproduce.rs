@@ -108,7 +108,7 @@ impl Verb for Reproduce {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let project = context.project(&self.subject)?;
         let given = (self.estimator.as_ref())
-            .map(|path| context.estimator(path, &self.subject))
+            .map(|path| context.estimator(path, Some(project.study()), &self.subject))
             .transpose()?;
         // An estimator carries the setting that it was made for.
         let study = (given.as_ref()).map_or(project.study(), Estimator::study);

@@ -44,12 +44,9 @@ pub(super) fn states(
             .and_then(|node| node.attribute("derivative"))
             .and_then(named);
         let state = state.map(|node| FmuVariable::read(node, version, types));
+        let is_listed = |of: &FmuVariable| states.iter().any(|s: &FmuVariable| s.name == of.name);
         match state.transpose()?.flatten() {
-            Some(state)
-                if states
-                    .iter()
-                    .any(|other: &FmuVariable| other.name == state.name) =>
-            {
+            Some(state) if is_listed(&state) => {
                 return Err(format!("<{tag} {key}=\"{of}\"> is listed twice"));
             }
             Some(state) => states.push(state),

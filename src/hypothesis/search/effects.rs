@@ -65,8 +65,8 @@ pub(crate) fn searched(
 fn switched_off(problem: &Problem, effects: &[Effect]) -> Problem {
     with_axes(problem, |axes, space| {
         for effect in effects {
-            for m in effect.magnitudes() {
-                if let Ok(j) = space.position(&effect.key().magnitude(m.name)) {
+            for (name, m) in effect.named_magnitudes() {
+                if let Ok(j) = space.position(&name) {
                     let off = m.off.unwrap_or(space[j].prior.centre());
                     axes[j].centre = space[j].bounds.clamp(off);
                     axes[j].held = true;
