@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -74,12 +76,94 @@ def test_numbers_that_mean_nothing_are_refused(twin, record):
 
 
 def test_a_wrong_description_is_named():
-    for wrong, part in [({"gain": (3.0, 1.0)}, "gain = .*low below high"), ({"gain": (float("nan"), 1.0)}, "gain"), (["gain"], "a dict of")]:
+    infinite = {"gain": (0.0, float("inf"))}
+    for wrong, part in [
+        ({"gain": (3.0, 1.0)}, "gain = .*low below high"), ({"gain": (1.0, 1.0)}, "gain = .*low below high"), (infinite, "gain = .*finite"),
+        ({"gain": (float("nan"), 1.0)}, "gain"), ({"gain": truetwin.Parameter((0, 1), unit=5)}, "gain, unit = 5"), ({3: (0, 1)}, "name = 3"),
+        (["gain"], "a dict of"),
+    ]:  # fmt: skip
         with pytest.raises((ValueError, TypeError), match=f"parameters.*{part}"):
             truetwin.Twin(heater, **{**SETTING, "parameters": wrong})
-    twisted = truetwin.Twin(heater, **{**SETTING, "parameters": {"gain": (1.0, 1.0)}})
-    with pytest.raises(truetwin.TruetwinError, match=r"the program `heater` .*invalid interval \[1, 1\]"):
-        twisted.simulate({"gain": 2.0})
+    # What the program finds is said of the twin, and not of the JSON that describes it.
+    for other, part in [({"outputs": "t"}, "is called t, which is the time"), ({"levels": {"v": (0, 1)}}, 'has no input "v"'), ({"name": "a b"}, "name")]:
+        twisted = truetwin.Twin(heater, **{**SETTING, **other})
+        with pytest.raises(truetwin.TruetwinError, match=f"^the twin `.*`: .*{part}") as caught:
+            twisted.simulate({"gain": 2.0})
+        assert "{" not in caught.value.line
+
+
+def test_arguments_are_checked_where_they_are_given(record, tmp_path):
+    sympy = pytest.importorskip("sympy")
+    pandas = pytest.importorskip("pandas")
+    equations = {"parameters": {"k": (0.1, 2.0)}, "states": {"x": {"rate": "-k*x", "start": 1.0}}, "outputs": {"y": "x"}, "step": 0.1}
+
+    def text(**changed):
+        return truetwin.Twin(**{**equations, **changed})
+
+    x, t = sympy.symbols("x t")
+    for call, part in [
+        (lambda: truetwin.Twin(heater, **{**SETTING, "outputs": [3]}), "outputs: a name = 3; give a text"),
+        (lambda: truetwin.Twin(heater, **{**SETTING, "outputs": b"y"}), "outputs = b'y'; give names"),
+        (lambda: truetwin.Twin(heater, **{**SETTING, "outputs": {"y": 1}}), "outputs: y, unit = 1; give a text"),
+        (lambda: truetwin.Twin(heater, **SETTING, levels={"power": float("nan")}), "levels: power = nan; give"),
+        (lambda: truetwin.Twin(heater, **SETTING, samples=10**30), "samples = .*below 2\\*\\*53"),
+        (lambda: truetwin.Twin(heater, **SETTING, study=5), "study of type int; give a path"),
+        (lambda: text(states={1: "-x"}), "a name = 1; give a text"),
+        (lambda: text(states={"x": sympy.Derivative(x, t)}), "x, rate: Derivative of sympy is unknown"),
+        (lambda: text(states={"x": sympy.Matrix([x])}), "x, rate: .*Matrix of sympy is unknown"),
+        (lambda: text(states={"x": "\ud800"}), "x, rate = .*a character that no file holds"),
+        (lambda: text(levels=(-1, 1), step=None), "levels are those of simulated records.*give step=seconds"),
+        (lambda: text(record={"step": 0.2}), "step is given twice"),
+        (lambda: text(samples=40, record={"samples": 10}), "samples is given twice"),
+        (lambda: text(outputs={"y": {"value": "x", "noise": 0.1}}, noise={"y": 0.5}), "noise of y is given twice"),
+        (lambda: text(drift="f", states=["x"]), "drift of type str; give a function"),
+        (lambda: text(states=["x", "x"], drift=abs), "states: x appears twice"),
+        (lambda: text().simulate({"k": 1.0}, noise_free="no"), "noise_free = 'no'; give True or False"),
+        (lambda: text().fit(""), "record 1 = ''; give the path"),
+        (lambda: text().fit("a\0"), "record 1 = .*; give the path"),
+        (lambda: text().fit(pandas.Series([1.0])), "records of type Series"),
+        (lambda: text().fit(b"r.csv"), "records of type bytes"),
+        (lambda: text().fit(io.StringIO("t,y")), "records of type StringIO"),
+        (lambda: text().fit({"t": None, "y": [1.0]}), "record 1, column t: None; give one value per sample"),
+    ]:
+        with pytest.raises((ValueError, TypeError), match=part):
+            call()
+    # A symbol is a name, several times of an event are an array, and a name may begin like an option.
+    assert "x = { rate" in text(states={sympy.Symbol("x"): {"rate": "-k*x", "start": 1.0}}, events=None).toml()
+    assert "at = [1.0, 2.0]" in text(events=[{"at": np.array([1.0, 2.0]), "add": {"x": 1.0}}]).toml()
+    odd = truetwin.Twin(lambda p, u, t: np.exp(-p["-x"] * t), parameters={"-x": (0.1, 2.0)}, outputs="y", step=0.1)
+    assert odd.simulate({"-x": 0.5})["y"].size == 300
+
+
+def test_remedies_are_arguments(record):
+    """Who gave no study file and no options reads of none."""
+    without_levels = {key: value for key, value in SETTING.items() if key != "levels"}
+    times = np.cumsum(np.linspace(0.5, 1.5, len(record["t"])))
+    driven = {"t": record["t"], "power": record["power"]}
+    for call, part in [
+        (lambda: truetwin.Twin(heater, **without_levels).simulate({"gain": 2.0, "tau": 10.0}), "levels=\\(low, high\\)"),
+        (lambda: truetwin.Twin(heater, **SETTING).fit(record, columns={"foo": "power"}), "columns={name: column}"),
+        (lambda: truetwin.Twin(heater, **SETTING).fit({**record, "t": times}), "resample"),
+        (lambda: truetwin.Twin(lambda p, u, t: np.full(t.size, np.nan), **SETTING).fit(record), "check units, step and bounds"),
+        (lambda: truetwin.Twin(lambda p, u, t: 1 / 0, **SETTING, noise=0.1).simulate({"gain": 2.0, "tau": 10.0}, driven), "ZeroDivisionError"),
+    ]:
+        with pytest.raises((truetwin.TruetwinError, ValueError), match=part) as caught:
+            call()
+        assert not re.search(r"study|\.toml|--\w|\[record\]", str(caught.value)), caught.value
+
+
+def test_an_exception_without_words_ends_the_call_too(record):
+    class Mute(Exception):
+        def __str__(self):
+            raise RuntimeError("no words")
+
+    for error, said in ((Mute(), "Mute"), (ValueError("\ud800"), r"ValueError: \?")):
+        def broken(parameters, inputs, time):
+            raise error
+
+        with pytest.raises(truetwin.TruetwinError, match=said) as caught:
+            truetwin.Twin(broken, **SETTING).fit(record)
+        assert caught.value.__cause__ is error
 
 
 def test_an_exception_of_the_simulator_comes_through(record):

@@ -178,3 +178,22 @@ def test_times_of_several_kinds_are_refused(twin, record):
     frame = pd.DataFrame({name: values for name, values in record.items() if name != "t"})
     mixed = frame.set_index(pd.Index([*NAIVE[:5], *AWARE[5:]], dtype=object))
     refused(f"record 1, index: row 5 has a time zone, {none}", lambda: twin.fit(mixed))
+
+
+def test_rows_without_times_have_the_twins_step_or_are_refused(twin, record):
+    """The index of a frame counts rows, unless it is named as times; a column that the twin has not may be the times."""
+    pandas = pytest.importorskip("pandas")
+    rows = {name: values for name, values in record.items() if name != "t"}
+    fits = [twin.fit(given).parameters for given in (rows, pandas.DataFrame(rows), pandas.DataFrame(rows, index=[f"r{k}" for k in range(100)]))]
+    assert fits[0] == fits[1] == fits[2]
+    for given in ({**rows, "time": record["t"]}, pandas.DataFrame({**rows, "time": record["t"]})):
+        with pytest.raises(ValueError, match="no column t, and others that the twin has not: time; name its times with columns"):
+            twin.fit(given)
+        assert twin.fit(given, columns={"t": "time"}).parameters == twin.fit(record).parameters
+    # Labels of a frame need be no texts.
+    numbered = pandas.DataFrame({0: record["t"], 1: record["power"], 2: record["temperature"]})
+    assert twin.fit(numbered, columns={"t": 0, "power": 1, "temperature": 2}).parameters == twin.fit(record).parameters
+    twice = pandas.DataFrame(np.column_stack([record["t"], record["power"], record["power"], record["temperature"]]))
+    twice.columns = ["t", "power", "power", "temperature"]
+    with pytest.raises(ValueError, match="record 1 has two columns power; rename or remove one"):
+        twin.fit(twice)

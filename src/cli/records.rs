@@ -54,7 +54,7 @@ pub(super) fn read(
     Ok((records, validation))
 }
 
-/// Warns of records whose times seem to be in another unit: a fit of them may take long.
+/// Warns of records whose times seem to be in another unit.
 pub(super) fn warn_of_times<'r>(
     study: &Study,
     records: impl Iterator<Item = (&'r PathBuf, &'r Record)>,

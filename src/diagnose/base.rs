@@ -201,13 +201,13 @@ impl Base {
 
     /// A fitted model in units of its records, of which nothing else is known yet.
     fn of(model: Model) -> Result<Self, StudyError> {
-        let (theta, outline) = (model.theta(), model.problem.outline());
+        let theta = model.theta();
         let records = model.problem.records.clone();
         let seen = model.problem.states(&model.fitted.theta)?;
         let (filtered, states): (Vec<_>, Vec<_>) = seen.into_iter().unzip();
         Ok(Self {
             reacting: reacting(&filtered, &records),
-            scales: Scales::new(&model.base, &theta, records, states, outline),
+            scales: Scales::new(&model.base, &theta, &model.problem, states),
             frequencies: frequencies(&model)?,
             noisy: vec![],
             is_silent: false,

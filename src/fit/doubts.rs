@@ -24,7 +24,7 @@ pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 const LEAVE_OUT: &str = "leave the effect out: the record does not ask for it";
 
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 23] = [
+const REMEDIES: [(&str, &str); 24] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",
@@ -98,6 +98,7 @@ const REMEDIES: [(&str, &str); 23] = [
         "declare the start of these records, or the time that it belongs to",
     ),
     ("step-matters", "fit or train again with such a step"),
+    ("time-unit", "convert t to seconds"),
     (
         "validation-is-record",
         "give a second measurement: the share closed is otherwise that of fitted data",
@@ -138,6 +139,15 @@ impl Warning {
             "step-matters",
             format!("the step{of} is {fault}"),
         ))
+    }
+
+    /// Times of record `r` of so many that are in another unit than seconds, by what shows it.
+    pub(crate) fn time_unit(shown: String, r: usize, records: usize) -> Self {
+        let of = match records {
+            1 => String::new(),
+            _ => format!("record {}: ", r + 1),
+        };
+        Self::new("time-unit", of + &shown)
     }
 
     /// A rule for inputs between samples that is not the study's.

@@ -49,7 +49,7 @@ impl Library<'_> {
                 .map(|m| (m.name.to_owned(), m.off.unwrap_or(0.0)));
             let term = bare(effect, held.collect());
             let twin = with_terms(self.twin, std::iter::once(&term))?;
-            terms.extend(self.ranged(term, &values, &twin, false)?);
+            terms.extend(self.ranged(term, (target, &values), (&twin, false))?);
         }
         if let OutputMark::Present(shown) = mark {
             terms
@@ -74,8 +74,8 @@ impl Library<'_> {
             });
         let mut term = bare(effect, held.collect());
         term.entries = Some(effect.magnitudes().iter().filter_map(entry).collect());
-        let (_, values) = self.bent(effect);
-        let Some(mut term) = self.ranged(term, &values, self.twin, true)? else {
+        let (target, values) = self.bent(effect);
+        let Some(mut term) = self.ranged(term, (target, &values), (self.twin, true))? else {
             return Ok(None);
         };
         let shown = match mark(effect, &values) {
@@ -120,9 +120,8 @@ impl Library<'_> {
     fn ranged(
         &self,
         mut term: Term,
-        values: &[f64],
-        twin: &Twin,
-        is_own: bool,
+        (target, values): (usize, &[f64]),
+        (twin, is_own): (&Twin, bool),
     ) -> Result<Option<Term>, FilterError> {
         let Part::Effect { effect, .. } = &term.part else {
             return Ok(None);
@@ -134,9 +133,11 @@ impl Library<'_> {
         };
         let frequencies = self.with_slow_ones();
         let others = self.others(&effect);
+        let before = self.scales.before(effect.law().target(), target);
         let ranges = Ranges {
             effect: &effect,
             values,
+            before: &before,
             others: &others,
             dt: self.scales.dt(),
             duration: self.scales.duration(),

@@ -23,6 +23,8 @@ pub(super) struct Ranges<'a> {
     pub effect: &'a Effect,
     /// None for a parameter.
     pub values: &'a [f64],
+    /// Those of a state at the prior's centre.
+    pub before: &'a [f64],
     /// Values of the other state of a law between two.
     pub others: &'a [f64],
     pub dt: f64,
@@ -124,9 +126,14 @@ impl Ranges<'_> {
         logarithmic(parameter, (slowest, fastest), grid)
     }
 
-    /// Level among the values, or beyond those of a state: uniform, and with longer steps.
+    /// Level among the values, or beyond those of a state: uniform, and with longer steps. A state that no sensor shows is larger where the effect acts
+    /// than without it, by as much as its parameters leave open.
     fn threshold(&self, parameter: &Parameter, is_upper: bool) -> (Vec<f64>, Axis) {
-        let (low, high) = self.ends();
+        let (mut low, mut high) = self.ends();
+        if !self.before.is_empty() {
+            let before = ends(self.before);
+            (low, high) = (low.min(before.0), high.max(before.1));
+        }
         let beyond = match self.effect.law().target() {
             TargetKind::State => TERM.beyond * (high - low),
             _ => 0.0,

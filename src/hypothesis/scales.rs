@@ -1,6 +1,7 @@
 //! Sizes of a record's signals, states and rates: the units that hypotheses are looked for in.
 
 use crate::effect::TargetKind;
+use crate::fit::problem::Problem;
 use crate::hypothesis::limits::TERM;
 use crate::math::deviation;
 use crate::record::{Record, Signal};
@@ -16,6 +17,8 @@ pub(crate) struct Scales {
     pub records: Arc<[Record]>,
     /// Filtered states of each record; a black box's predicted outputs.
     pub states: Vec<Signal>,
+    /// Filtered states at the prior's centre: what no sensor shows has another size at each θ. Empty for a black box.
+    pub before: Vec<Signal>,
     pub outline: Outline,
     /// Root mean square of each state's rate by the twin's equations; empty without equations.
     pub rates: Vec<f64>,
@@ -24,18 +27,18 @@ pub(crate) struct Scales {
 }
 
 impl Scales {
-    pub fn new(
-        twin: &Twin,
-        theta: &[f64],
-        records: Arc<[Record]>,
-        states: Vec<Signal>,
-        outline: Outline,
-    ) -> Self {
+    pub fn new(twin: &Twin, theta: &[f64], problem: &Problem, states: Vec<Signal>) -> Self {
+        let records = problem.records.clone();
         let rates = rates(twin, theta, &records, &states).unwrap_or_default();
+        let before = match problem.is_simulated() {
+            true => vec![],
+            false => problem.states(&problem.centre()).unwrap_or_default(),
+        };
         Self {
             records,
             states,
-            outline,
+            before: before.into_iter().map(|(_, states)| states).collect(),
+            outline: problem.outline(),
             rates,
             defined: twin.defined_states(),
         }
@@ -48,22 +51,19 @@ impl Scales {
 
     /// Values of a sensor, actuator or state, of all records.
     pub fn columns(&self, kind: TargetKind, target: usize) -> Vec<f64> {
-        let column = |signal: &Signal| -> Vec<f64> {
-            if target < signal.ncols() {
-                let values = signal.column(target).into_iter().copied();
-                values.filter(|v| v.is_finite()).collect()
-            } else {
-                vec![]
-            }
-        };
-        let all: Vec<Vec<f64>> = match kind {
-            TargetKind::Sensor => self.records.iter().map(|r| column(r.outputs())).collect(),
-            TargetKind::Actuator => (self.records.iter())
-                .map(|r| column(r.drive().inputs()))
-                .collect(),
-            _ => self.states.iter().map(column).collect(),
-        };
-        all.concat()
+        match kind {
+            TargetKind::Sensor => column(self.records.iter().map(Record::outputs), target),
+            TargetKind::Actuator => column(self.records.iter().map(|r| r.drive().inputs()), target),
+            _ => column(&self.states, target),
+        }
+    }
+
+    /// Values of a state at the prior's centre; none of others.
+    pub fn before(&self, kind: TargetKind, target: usize) -> Vec<f64> {
+        match kind {
+            TargetKind::State => column(&self.before, target),
+            _ => vec![],
+        }
     }
 
     /// Deviation of the values there; a share of the largest one where nothing moves.
@@ -103,6 +103,13 @@ impl Scales {
         let ends = self.records.iter().map(|r| r.drive().time(r.samples() - 1));
         ends.fold(0.0, f64::max)
     }
+}
+
+/// Finite values of a column of signals; none where they lack it.
+fn column<'s>(signals: impl IntoIterator<Item = &'s Signal>, target: usize) -> Vec<f64> {
+    let having = (signals.into_iter()).filter(|signal| target < signal.ncols());
+    let values = having.flat_map(|signal| signal.column(target).to_vec());
+    values.filter(|v| v.is_finite()).collect()
 }
 
 /// Root mean square of the rates along states.

@@ -56,7 +56,13 @@ impl Study {
         settings: &FitSettings,
         progress: &Progress,
     ) -> Result<Fit, StudyError> {
-        (self.twin).side_by_side(|| self.fit_asking(true, records, settings, progress))
+        let fit = || self.fit_asking(true, records, settings, progress);
+        let mut fit = self.twin.side_by_side(fit)?;
+        let shown = |(r, record)| Some((r, self.mistaken_time(record, settings.seed)?));
+        let mistaken = records.iter().enumerate().filter_map(shown);
+        (fit.warnings)
+            .extend(mistaken.map(|(r, shown)| Warning::time_unit(shown, r, records.len())));
+        Ok(fit)
     }
 
     /// As [`fit_with`](Self::fit_with); without asking, noise levels stay as they depend on the states in the twin, and nothing is profiled.

@@ -33,7 +33,7 @@ pub(crate) use blocks::Blocks;
 pub(crate) use composed::{
     Acting, DeadTime, Disturbance, Entry, FittedLevels, Follows, KnownNoise, LARGEST, Law, LawPart,
     LawPlace, LevelFactors, LevelSource, LevelValue, NoisePart, ParameterChange, RateChange,
-    Remember, Seen, SensorNoise, SignalChange, StateLimit, TwinPart, WhiteLevel,
+    Remember, Seen, SensorNoise, SignalChange, StateLimit, TwinPart, WhiteLevel, seconds_before,
 };
 pub use composed::{Composed, ComposedBlackBox, DigitalTwin};
 pub(crate) use definitions::rates;

@@ -9,7 +9,7 @@ from typing import Any, Union
 
 import numpy as np
 
-from ._numbers import mapping, number, shown
+from ._numbers import mapping, named, number, shown, text
 from ._simulator import Parameter, Range, ranged
 
 #: An expression: a text such as ``"-k*h + u"``, a number, or an expression of sympy.
@@ -36,9 +36,9 @@ def expression(what: str, value: Expression) -> str | float:
         No text, number or expression of sympy; or a function of sympy that the program does not know.
     """
     if isinstance(value, str):
-        return value.replace("**", "^")
+        return text(what, value).replace("**", "^")
     if _is_sympy(value):
-        return _sympy(value)
+        return _sympy(what, value)
     try:
         return number(what, value, "")
     except ValueError:
@@ -54,11 +54,17 @@ _NAMES = {
 _RELATIONS = {"Eq": "==", "Ne": "!=", "Lt": "<", "Le": "<=", "Gt": ">", "Ge": ">="}
 
 
-def _sympy(value: Any) -> str:
-    """Return an expression of sympy in the language of the program; brackets wherever they may matter."""
+def _sympy(what: str, value: Any) -> str:
+    """Return an expression of sympy in the language of the program; brackets wherever they may matter. `what` names it in a message."""
     import sympy  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
+    def unknown(e: Any) -> TypeError:
+        names = ", ".join(sorted(set(_NAMES.values())))
+        return TypeError(f"{what}: {type(e).__name__} of sympy is unknown to the program; write it with {names}")
+
     def written(e: Any) -> str:
+        if not isinstance(e, (sympy.Expr, sympy.logic.boolalg.Boolean)) or isinstance(e, (sympy.Derivative, sympy.Integral, sympy.Sum, sympy.Product)):
+            raise unknown(e)
         if e.is_Symbol:
             return str(e.name)
         if e.is_Integer:
@@ -74,10 +80,10 @@ def _sympy(value: Any) -> str:
         if e is sympy.true or e is sympy.false:
             return "1" if e is sympy.true else "0"
         if isinstance(e, sympy.Piecewise):
-            text = "0"
+            branches = "0"
             for branch, condition in reversed(e.args):
-                text = f"if({written(condition)}, {written(branch)}, {text})"
-            return text
+                branches = f"if({written(condition)}, {written(branch)}, {branches})"
+            return branches
         arguments = [written(argument) for argument in e.args]
         if e.is_Add:
             return "(" + " + ".join(arguments) + ")"
@@ -102,7 +108,7 @@ def _sympy(value: Any) -> str:
             return type(e).__name__
         name = _NAMES.get(type(e).__name__)
         if name is None:
-            raise TypeError(f"{type(e).__name__} of sympy is unknown to the program; write it with {', '.join(sorted(set(_NAMES.values())))}")
+            raise unknown(e)
         return f"{name}({', '.join(arguments)})"
 
     return written(value)
@@ -119,10 +125,10 @@ def _value(what: str, value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         # The escapes of JSON are some of TOML's.
-        return json.dumps(value, ensure_ascii=False)
+        return json.dumps(text(what, value), ensure_ascii=False)
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(f'{what}, {key}', inner)}" for key, inner in value.items()) + " }"
-    if isinstance(value, Sequence):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(f'{what}, {key}', inner)}" for key, inner in named(what, value, "keys").items()) + " }"
+    if isinstance(value, Sequence) or isinstance(value, np.ndarray) and value.ndim:
         return "[" + ", ".join(_value(what, inner) for inner in value) + "]"
     real = number(what, value, "give a number or a text")
     return str(int(real)) if isinstance(value, (int, np.integer)) else repr(real)
@@ -131,7 +137,7 @@ def _value(what: str, value: Any) -> str:
 def _keys(name: str, entry: Mapping[str, Any], expressions: Sequence[str]) -> dict[str, Any]:
     """Return the keys of the entry `name`, expressions of sympy as texts."""
     keys: dict[str, Any] = {}
-    for key, value in entry.items():
+    for key, value in named(name, entry, "keys").items():
         if key in expressions and not isinstance(value, Mapping):
             what = f"{name}, {key}"
             keys[key] = _ends(what, value) if key == "limits" else expression(what, value)
@@ -143,7 +149,7 @@ def _keys(name: str, entry: Mapping[str, Any], expressions: Sequence[str]) -> di
 
 
 def _ends(what: str, value: Any) -> list[str | float]:
-    if isinstance(value, str) or not isinstance(value, Sequence):
+    if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)):
         raise TypeError(f"{what} = {shown(value)}; give (low, high)")
     return [expression(what, end) for end in value]
 
@@ -161,7 +167,7 @@ def _parameter(name: str, value: Parameter | Range | Mapping[str, Any]) -> dict[
 
 def tables(entries: Mapping[str, Entry], key: str) -> dict[str, dict[str, Any]]:
     """Return the entries of states or outputs as tables of keys; `key` is that of an entry that is an expression alone."""
-    whole = {name: entry if isinstance(entry, Mapping) else {key: entry} for name, entry in entries.items()}
+    whole = {text("a name", name): entry if isinstance(entry, Mapping) else {key: entry} for name, entry in entries.items()}
     return {name: _keys(name, entry, (key, "next", "start", "noise", "limits")) for name, entry in whole.items()}
 
 
@@ -177,7 +183,7 @@ def _event(event: Mapping[str, Any]) -> str:
     for key, value in mapping("events: an entry", event, "when or at, and set or add").items():
         if isinstance(value, Mapping):
             keys[key] = {state: expression(f"events: {key}, {state}", inner) for state, inner in value.items()}
-        elif isinstance(value, Sequence) and not isinstance(value, str):
+        elif isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str) and np.ndim(value):
             keys[key] = [expression(f"events: {key}", inner) for inner in value]
         else:
             keys[key] = expression(f"events: {key}", value)
@@ -204,7 +210,7 @@ class Text:
         events: Sequence[Mapping[str, Any]],
         record: Mapping[str, Any],
     ) -> None:
-        self.name = name
+        self.name = text("name", name)
         self.inputs = list(inputs)
         self.outputs = list(outputs)
         self.step = record.get("step")

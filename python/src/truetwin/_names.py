@@ -6,11 +6,12 @@ import html
 import json
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ._numbers import one_line
+from ._numbers import one_line, shown
 
 #: Rows of a file in a finding, which shows the first of many.
 _ROWS = re.compile(r"(?P<before>\bin rows )(?P<rows>\d+(?:, \d+)*(?:, …)?)")
@@ -45,10 +46,56 @@ class Rows:
         return f"{', '.join(map(str, positions))}{more} (counted from 0{index})"
 
 
-def word(path: str | os.PathLike[str]) -> str:
-    """Return a path as a word of a call, which is no option."""
-    text = os.fspath(path)
-    return f".{os.sep}{text}" if text.startswith("-") else text
+#: What the program says of its description, which the user gave as arguments.
+_DESCRIPTION = re.compile(r"the program (`.*?`) answered \".*\": (.*?)(?: at line \d+ column \d+)?; asked to describe itself, it must answer .*")
+#: Options of the program, as arguments say them.
+_OPTIONS = {
+    r" \(--columns t=NAME.*? takes other names\)": " (columns={name: column} takes other names)",
+    r" \(--timeout SECONDS allows more\)": " (timeout=seconds allows more)",
+    r"flush each answer, or allow more time for one": "allow more time for one",
+    r" \(`truetwin resample R\.csv --step S --out R2\.csv`(.*?)\)": r" (`truetwin resample` does it for a file\1)",
+    r"leave the cell of an output empty if it was not measured": "give nan in an output that was not measured",
+    r"--step-of-record": "step_of_record=True",
+    r"--theta": "parameters",
+}
+#: Keys of study files, as arguments say them.
+_KEYS = {
+    r" \(\[record\] input = .*? in the study file\)": " (levels=(low, high), or a plan for each input)",
+    r" \((?:all of them in )?\[\w+\] of the study file\)": "",
+    r"; \[record\] step of the study file": "; step of the twin",
+    r"\[record\] substeps or integrator of the study file": "record={'substeps': n} or another integrator",
+    r"\bthe study('s step| has no plan)": r"the twin\1",
+    r"\b(in|step of) the study\b": r"\1 the twin",
+}
+
+
+def _in_arguments(words: Mapping[str, str], text: str) -> str:
+    for pattern, argument in words.items():
+        text = re.sub(pattern, argument, text)
+    return text
+
+
+def word(path: str | os.PathLike[str], what: str = "path") -> str:
+    """Return a path as a word of a call, which is no option.
+
+    Raises
+    ------
+    TypeError, ValueError
+        No path, an empty one, or one that no file has.
+    """
+    try:
+        name = os.fspath(path)
+    except TypeError:
+        raise TypeError(f"{what} of type {type(path).__name__}; give a path") from None
+    if not isinstance(name, str):
+        raise TypeError(f"{what} of type {type(path).__name__}; give a path as a text")
+    try:
+        is_whole = b"\0" not in os.fsencode(name)
+    except UnicodeEncodeError:
+        is_whole = False
+    if not name or not is_whole:
+        raise ValueError(f"{what} = {shown(name)}; give the path of a file")
+    return f".{os.sep}{name}" if name.startswith("-") else name
 
 
 class Names:
@@ -58,10 +105,13 @@ class Names:
     ----------
     folder : Path
         Temporary folder of the call; its files have the names that the user reads.
+    in_arguments : bool
+        Whether the twin is given as arguments; otherwise it has a study file.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, in_arguments: bool = False) -> None:
         self._folder = folder
+        self._in_arguments = in_arguments
         self._words: dict[str, str] = {}
         self._rows: dict[str, Rows] = {}
         self.hide(folder)
@@ -72,7 +122,7 @@ class Names:
 
     def say(self, text: str, word: str) -> None:
         """Say a word in place of a text, as it is in messages, in JSON and in pages."""
-        self._words |= dict.fromkeys((text, json.dumps(text, ensure_ascii=False)[1:-1], html.escape(text)), word)
+        self._words |= dict.fromkeys((text, json.dumps(text, ensure_ascii=False)[1:-1], html.escape(text)), one_line(word))
 
     def write(self, name: str, rows: Rows) -> Path:
         """Return the path of a new file of a record."""
@@ -91,12 +141,17 @@ class Names:
         for name, rows in self._rows.items():
             place = re.escape(str(self._folder / name))
             text = _moved(rf"(?P<before>{place}(?:, |: )row )(?P<rows>\d+)", rows, text)
-        return self.plain(text).replace("--theta", "parameters")
+        return self.argued(_DESCRIPTION.sub(r"the twin \1: \2", self.plain(text)))
+
+    def argued(self, text: str) -> str:
+        """Return a message with arguments in place of options, and of keys of a study file where the user has none."""
+        text = _in_arguments(_OPTIONS, text)
+        return _in_arguments(_KEYS, text) if self._in_arguments else text
 
     def finding(self, name: str, text: str) -> str:
         """Return a message about the record `name`, which does not name it."""
         rows = self._rows.get(name)
-        return text if rows is None else _moved(_ROWS, rows, text)
+        return self.argued(text if rows is None else _moved(_ROWS, rows, text))
 
     def unfinished(self, text: bytes) -> int:
         """Return where a path of the temporary folder begins at the end of a text; its length if none does."""

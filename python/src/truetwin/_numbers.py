@@ -19,13 +19,13 @@ COMPLEX = "complex values; give real ones, such as their real parts or magnitude
 
 def shown(value: object) -> str:
     """Return a value as a message shows it: in one line, and cut if it is long."""
-    text = one_line(repr(value))
-    return text if len(text) <= LONGEST else text[:LONGEST] + "…"
+    line = one_line(repr(value))
+    return line if len(line) <= LONGEST else line[:LONGEST] + "…"
 
 
-def one_line(text: str) -> str:
+def one_line(lines: str) -> str:
     """Return a text without ends of lines, which a message has not."""
-    return " ".join(text.split())
+    return " ".join(lines.split())
 
 
 def number(what: str, value: object, remedy: str) -> float:
@@ -45,10 +45,10 @@ def number(what: str, value: object, remedy: str) -> float:
 
 
 def whole(name: str, value: object) -> int:
-    """Return a number of samples, which may be a float such as 300.0; refuse one that is not whole, or below 1."""
-    remedy = "give a whole number of samples, at least 1"
+    """Return a number of samples, which may be a float such as 300.0; refuse one that is not whole, below 1, or beyond exact floats."""
+    remedy = "give a whole number of samples, at least 1 and below 2**53"
     samples = number(name, value, remedy)
-    if not samples.is_integer() or samples < 1:
+    if not samples.is_integer() or not 1 <= samples < 2**53:
         raise ValueError(f"{name} = {shown(value)}; {remedy}")
     return int(samples)
 
@@ -66,15 +66,22 @@ def count(name: str, value: object, least: int, most: int | None = None) -> int:
     return integer
 
 
+def flag(name: str, value: object) -> bool:
+    """Return True or False; refuse anything else, whose truth may not be what it says."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name} = {shown(value)}; give True or False")
+    return bool(value)
+
+
 def interval(what: str, value: Any, remedy: str = "give (low, high)") -> tuple[float, float]:
-    """Return two numbers; refuse anything else."""
+    """Return two finite numbers of which the first is smaller; refuse anything else."""
     try:
         low, high = value
         ends = number(what, low, remedy), number(what, high, remedy)
     except (TypeError, ValueError):
         raise ValueError(f"{what} = {shown(value)}; {remedy}") from None
-    if not ends[0] <= ends[1]:
-        raise ValueError(f"{what} = {shown(value)}; {remedy}, low below high")
+    if not (ends[0] < ends[1] and np.isfinite(ends[1] - ends[0])):
+        raise ValueError(f"{what} = {shown(value)}; {remedy}, low below high, both finite")
     return ends
 
 
@@ -85,6 +92,21 @@ def mapping(what: str, value: Any, of: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise TypeError(f"{what} of type {type(value).__name__}; give a dict of {of}")
     return value
+
+
+def text(what: str, value: Any) -> str:
+    """Return a text that a file can hold, or the name of a symbol of sympy; refuse anything else."""
+    value = getattr(value, "name", value) if hasattr(value, "free_symbols") else value
+    if not isinstance(value, str):
+        raise TypeError(f"{what} = {shown(value)}; give a text")
+    if "\0" in value or any("\ud800" <= c <= "\udfff" for c in value):
+        raise ValueError(f"{what} = {shown(value)}: a character that no file holds; leave it out")
+    return value
+
+
+def named(what: str, value: Any, of: str) -> dict[str, Any]:
+    """Return a dict whose keys are texts; refuse anything else."""
+    return {text(f"{what}: a name", name): entry for name, entry in mapping(what, value, of).items()}
 
 
 def reals(values: Any, remedy: str) -> Array:

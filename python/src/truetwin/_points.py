@@ -11,7 +11,7 @@ import numpy as np
 from ._equations import Entry, _parameter, expression, tables
 from ._errors import Diverged
 from ._numbers import Array, number, reals
-from ._simulator import Parameter, Range, _located, _name, _units
+from ._simulator import Parameter, Range, _located, _name, units_of
 
 #: ``f(t, x, u, theta)``: arrays of shape (points,), (states, points), (inputs, points) and (parameters, points).
 Equation = Callable[[Array, Array, Array, Array], Array]
@@ -50,7 +50,7 @@ class PointModel:
             "outputs": tables(_open(outputs) if observe else outputs, "value"),
         }
         self.states, self.outputs = list(described["states"]), list(described["outputs"])
-        units = inputs if isinstance(inputs, Mapping) else _units(inputs)
+        units = inputs if isinstance(inputs, Mapping) else units_of("inputs", inputs)
         self.inputs = list(units)
         self._functions: dict[str, tuple[Equation, list[str]]] = {}
         if drift:

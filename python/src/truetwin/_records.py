@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._names import Names, Rows, word
-from ._numbers import Array, mapping, one_line, reals
+from ._numbers import Array, named, one_line, reals, shown
 from ._times import is_timed, seconds
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ def as_list(records: Records) -> list[Record]:
     """Return one or several records as a list."""
     if isinstance(records, (str, os.PathLike, Mapping)) or is_frame(records):
         return [records]  # type: ignore[list-item, unused-ignore]
-    if not isinstance(records, Iterable):
+    # Arrays have a dtype; an open file gives its lines.
+    if not isinstance(records, Iterable) or isinstance(records, (bytes, bytearray)) or hasattr(records, "dtype") or hasattr(records, "read"):
         raise TypeError(f"records of type {type(records).__name__}; give a path, a DataFrame, a dict of arrays, or a list of these")
     given: list[Record] = list(records)  # type: ignore[arg-type, unused-ignore]
     if not given:
@@ -70,9 +71,11 @@ class Writer:
         step: float | None,
     ) -> None:
         self._names = names
-        self._columns = mapping("columns", columns, "name in the twin: column")
-        if odd := [name for name, column in self._columns.items() if not (isinstance(column, str) and column.strip())]:
-            raise ValueError(f"columns: {odd[0]} = {self._columns[odd[0]]!r}; give the name of a column")
+        given = named("columns", columns, "name in the twin: column")
+        # A data frame may have any labels.
+        self._columns = {name: str(column) for name, column in given.items() if column is not None and str(column).strip()}
+        if odd := [name for name in given if name not in self._columns]:
+            raise ValueError(f"columns: {odd[0]} = {given[odd[0]]!r}; give the name of a column")
         self._inputs = inputs
         self._outputs = outputs
         self._step = step
@@ -83,7 +86,7 @@ class Writer:
         A record that is `driven` needs no outputs.
         """
         if isinstance(record, (str, os.PathLike)):
-            return word(record)
+            return word(record, name)
         if not (isinstance(record, Mapping) or is_frame(record)):
             raise TypeError(f"{name}: a record of type {type(record).__name__}; give a path, a DataFrame or a dict of arrays")
         columns = self._chosen(name, record, driven)
@@ -99,6 +102,8 @@ class Writer:
         names = list(record.columns if is_frame(record) else record)
         self._check(label, [str(name) for name in names], driven)
         time = self._columns.get("t", "t")
+        if twice := [name for at, name in enumerate(names) if self._wanted(str(name)) and str(name) in map(str, names[:at])]:
+            raise ValueError(f"{label} has two columns {one_line(str(twice[0]))}; rename or remove one")
         columns = {
             str(name): _column(f"{label}, column {name}", record[name], str(name) == time) for name in names if self._wanted(str(name))
         }
@@ -140,10 +145,16 @@ class Writer:
         """Return the times of a record without a column for them; None if nothing gives them."""
         if is_frame(record):
             index = record.index
-            if index.name in ("t", "time", self._columns.get("t")) or is_timed(index):
+            if index.name is not None and index.name in ("t", "time", self._columns.get("t")) or is_timed(index):
                 return _column(f"{label}, index", index, True)
         if "t" in self._columns:
             raise ValueError(f"{label} has no column {self._columns['t']}, which columns gives for t; correct columns")
+        others = [str(name) for name in record if not self._wanted(str(name))]
+        if self._step is not None and others:
+            raise ValueError(
+                f"{label} has no column t, and others that the twin has not: {_listed(others)}; name its times with columns={{'t': ...}}, "
+                "or leave these out for rows of the twin's step"
+            )
         return None if self._step is None else np.arange(samples, dtype=float) * self._step
 
 
@@ -160,12 +171,15 @@ def _is_usual(letter: str, name: str) -> bool:
 def _column(what: str, values: Any, timed: bool) -> Array:
     """Return a column as floats, nan where it is masked or missing; times as seconds from the first if it is the column of times."""
     what = one_line(what)
+    if values is None or np.isscalar(values):
+        raise ValueError(f"{what}: {shown(values)}; give one value per sample")
     try:
         moments = seconds(values) if timed else None
         remedy = "give seconds, or times, as pandas.to_datetime reads them from texts" if timed else "give numbers, nan where missing"
         column = reals(values, remedy) if moments is None else moments
     except OverflowError:
-        raise ValueError(f"{what}: a number beyond those of floats; correct it, or give nan where an output is missing") from None
+        beyond = "times beyond those of the clock" if timed else "a number beyond those of floats"
+        raise ValueError(f"{what}: {beyond}; correct it{'' if timed else ', or give nan where an output is missing'}") from None
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what}: {one_line(str(error))}") from None
     if column.ndim != 1:
@@ -203,7 +217,7 @@ def _cell(text: str, odd: str = ',"\r\n;\t#') -> str:
 
 def columns_of(columns: Mapping[str, str]) -> str:
     """Return names of columns as the program takes them."""
-    return ",".join(f"{name}={_cell(column, ',' + chr(34))}" for name, column in columns.items())
+    return ",".join(f"{name}={_cell(str(column), ',' + chr(34))}" for name, column in columns.items())
 
 
 def read(path: Path, inputs: Sequence[str], outputs: Sequence[str]) -> dict[str, Array]:

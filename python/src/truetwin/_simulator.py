@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ._errors import Diverged
-from ._numbers import Array, interval, number, reals, shown, whole
+from ._names import word
+from ._numbers import Array, interval, named, number, one_line, reals, shown, text, whole
 from ._records import is_frame
 
 #: What a simulator may return: one output, a tuple or the columns of an array for several, or outputs by name.
@@ -65,8 +66,8 @@ class Model:
         name: str | None,
     ) -> None:
         self.simulator = simulator
-        self.inputs = _units(inputs)
-        self.outputs = _units(outputs)
+        self.inputs = units_of("inputs", inputs)
+        self.outputs = units_of("outputs", outputs)
         self.parameters = {key: ranged(key, value) for key, value in parameters.items()}
         self.step = seconds("step", step)
         self.name = name or _name(simulator)
@@ -222,15 +223,21 @@ def _list(names: Iterable[object]) -> str:
     return ", ".join(str(name) for name in names) or "none"
 
 
-def _units(names: str | Sequence[str] | Mapping[str, str]) -> dict[str, str]:
-    if isinstance(names, str):
-        return {names: ""}
+def listed(what: str, names: Any) -> list[str]:
+    """Return names, each once; a text is one. Refuse anything else."""
+    if isinstance(names, (bytes, bytearray)) or not isinstance(names, Iterable):
+        raise TypeError(f"{what} = {shown(names)}; give names, or a dict with a unit for each")
+    given = [text(f"{what}: a name", name) for name in ([names] if isinstance(names, str) else names)]
+    if twice := [name for at, name in enumerate(given) if name in given[:at]]:
+        raise ValueError(f"{what}: {twice[0]} appears twice; rename one")
+    return given
+
+
+def units_of(what: str, names: str | Iterable[str] | Mapping[str, str]) -> dict[str, str]:
+    """Return names with their units, which may be missing."""
     if isinstance(names, Mapping):
-        return dict(names)
-    units = dict.fromkeys(names, "")
-    if len(units) != len(names):
-        raise ValueError(f"inputs or outputs {_list(names)}: a name appears twice; rename one")
-    return units
+        return {name: text(f"{what}: {name}, unit", unit or "") for name, unit in named(what, names, "units").items()}
+    return dict.fromkeys(listed(what, names), "")
 
 
 def planned(levels: Levels, hold: int) -> dict[str, Any]:
@@ -238,15 +245,18 @@ def planned(levels: Levels, hold: int) -> dict[str, Any]:
     if not isinstance(levels, Mapping):
         return _staircase("levels", levels, hold)
     plans: dict[str, Any] = {}
-    for name, plan in levels.items():
+    for name, plan in named("levels", levels, "plans").items():
         if isinstance(plan, (str, os.PathLike)):
-            plans[name] = os.path.abspath(os.fspath(plan))
+            plans[name] = os.path.abspath(word(plan, f"levels: {name}"))
         elif isinstance(plan, Mapping):
             if unknown := set(plan) - {"levels", "hold"}:
                 raise ValueError(f"levels: {name} has no {sorted(unknown)[0]}; give levels and hold")
             plans[name] = _staircase(f"levels: {name}", plan.get("levels"), whole(f"levels: {name}, hold", plan.get("hold", hold)))
         elif np.ndim(plan) == 0 and not isinstance(plan, bool):
-            plans[name] = number(f"levels: {name}", plan, "give (low, high), a number, or the path of a file")
+            remedy = "give (low, high), a number, or the path of a file"
+            plans[name] = number(f"levels: {name}", plan, remedy)
+            if not np.isfinite(plans[name]):
+                raise ValueError(f"levels: {name} = {shown(plan)}; {remedy}")
         else:
             plans[name] = _staircase(f"levels: {name}", plan, hold)
     return plans
@@ -262,7 +272,7 @@ def ranged(name: str, value: Parameter | Range) -> Parameter:
     if not isinstance(value, Parameter):
         return Parameter(interval(what, value, "give (low, high), or truetwin.Parameter(...)"))
     bounds = None if value.bounds is None else interval(f"{what}, bounds", value.bounds)
-    return Parameter(interval(f"{what}, prior", value.prior), bounds, value.unit)
+    return Parameter(interval(f"{what}, prior", value.prior), bounds, text(f"{what}, unit", value.unit))
 
 
 def _described(name: str, parameter: Parameter) -> dict[str, Any]:
@@ -292,9 +302,14 @@ def _located(error: BaseException, simulator: Simulator) -> str:
     own = [frame for frame in frames if code is not None and frame.filename == code.co_filename]
     # The first frames are this package's own.
     outside = [frame for frame in frames if os.path.dirname(frame.filename) != os.path.dirname(__file__)]
-    text = " ".join(f"{type(error).__name__}: {error}".split())
+    try:
+        said = one_line(f"{type(error).__name__}: {error}")
+    except Exception:  # One whose text raises, too.
+        said = type(error).__name__
+    # A lone half of a pair has no bytes.
+    said = said.encode(errors="replace").decode()
     for frame in (own or outside)[-1:]:
-        return f"{os.path.basename(frame.filename)}, line {frame.lineno}: {text}"
+        return f"{os.path.basename(frame.filename)}, line {frame.lineno}: {said}"
     if code is not None:
-        return f"{os.path.basename(code.co_filename)}, line {code.co_firstlineno}: {text}"
-    return text
+        return f"{os.path.basename(code.co_filename)}, line {code.co_firstlineno}: {said}"
+    return said

@@ -14,13 +14,13 @@ from . import _process, _records
 from ._equations import Entry, Expression, Text, is_expression
 from ._errors import TruetwinError
 from ._names import Names, word
-from ._numbers import Array, count, mapping, number, whole
+from ._numbers import Array, count, flag, mapping, named, number, one_line, whole
 from ._points import Equation, PointModel, States
 from ._records import Record, Records
 from ._report import Report
 from ._results import Check, Diagnosis, Estimate, Estimator, Fit, Json, Scorecard
 from ._server import Server
-from ._simulator import Levels, Model, Parameter, Range, Simulator, _units, noise_level, planned, seconds
+from ._simulator import Levels, Model, Parameter, Range, Simulator, listed, noise_level, planned, seconds, units_of
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped, unused-ignore]
@@ -29,6 +29,10 @@ Path_ = str | os.PathLike[str]
 
 #: The program's seeds have 64 bits.
 LARGEST_SEED = 2**64 - 1
+
+
+#: Samples of a simulated record, and those for which a random input is held.
+SAMPLES, HOLD = 300, 20
 
 
 class Twin:
@@ -71,12 +75,12 @@ class Twin:
         Standard deviation of the measurement noise of each output, for `simulate`, `pretrain`, `check` and `withheld`. `fit` and
         `diagnose` estimate it from the record.
     samples : int, optional
-        Number of samples of simulated records.
+        Number of samples of simulated records, 300 where none is given.
     levels : (low, high), or dict of str to (low, high), dict, float or path, optional
         Inputs of simulated records. A range: each input a staircase of random levels. By input: such a range, or
         ``{"levels": (low, high), "hold": n}``; a constant; or, for equations as texts, the path of a CSV file that has the column.
     hold : int, optional
-        Number of samples for which a random input is held.
+        Number of samples for which a random input is held, 20 where none is given.
     name : str, optional
         Name in reports and estimators. The default is the name of the callable.
     study : path, optional
@@ -114,28 +118,41 @@ class Twin:
         record: Mapping[str, Any] | None = None,
         step: float | None = None,
         noise: float | Mapping[str, float] | None = None,
-        samples: int = 300,
+        samples: int | None = None,
         levels: Levels | None = None,
-        hold: int = 20,
+        hold: int | None = None,
         name: str | None = None,
         study: Path_ | None = None,
         workers: int = 1,
         threads: int | None = None,
         timeout: float = 60.0,
     ) -> None:
-        parameters = mapping("parameters", parameters, "name: (low, high)")
-        constants, define = mapping("constants", constants, "name: number"), mapping("define", define, "name: expression")
+        parameters = named("parameters", parameters, "name: (low, high)")
+        constants, define = named("constants", constants, "name: number"), named("define", define, "name: expression")
         record = mapping("record", record, "keys")
         inputs = () if inputs is None else inputs
-        if isinstance(events, Mapping):
-            raise TypeError("events of type dict; give a list of dicts")
+        events = () if events is None else events
+        if isinstance(events, (Mapping, str)) or not isinstance(events, Sequence):
+            raise TypeError(f"events of type {type(events).__name__}; give a list of dicts")
         if not (name is None or isinstance(name, str)):
             raise TypeError(f"name of type {type(name).__name__}; give a text")
-        self._study = study
+        if not (outputs is None or isinstance(outputs, Mapping)):
+            outputs = listed("outputs", outputs)
+        if not (states is None or isinstance(states, Mapping)):
+            states = listed("states", states)
+        for given, function in (("drift", drift), ("observe", observe)):
+            if not (function is None or callable(function)):
+                raise TypeError(f"{given} of type {type(function).__name__}; give a function")
+        if twice := [key for key, value in (("step", step), ("samples", samples)) if value is not None and key in record]:
+            raise ValueError(f"{twice[0]} is given twice, here and in record; give one")
+        if levels is not None and step is None and "step" not in record and study is None:
+            raise ValueError("levels are those of simulated records, which need a step; give step=seconds, too")
+        self._study = None if study is None else word(study, "study")
         self._threads = None if threads is None else count("threads", threads, 1)
         self._workers = count("workers", workers, 1)
         self._timeout = seconds("timeout", timeout)
-        samples, hold = whole("samples", samples), whole("hold", hold)
+        samples = whole("samples", SAMPLES if samples is None else samples)
+        hold = whole("hold", HOLD if hold is None else hold)
         self._noise: dict[str, float] = {}
         self._model: Model | PointModel | None = None
         self._text: Text | None = None
@@ -153,7 +170,7 @@ class Twin:
                 files = [of for of, own in plan["input"].items() if isinstance(own, str)]
                 if files and (drift or observe):
                     raise ValueError(f"levels: {files[0]} is a file, which equations as texts take; give (low, high) or a number")
-            plan |= record
+            plan |= named("record", record, "keys")
             levels_of_noise = _noise_levels(noise, outputs, _names_of(states), expressions=True)
             moving, shown = _noisy(states, levels_of_noise, "rate", drift), _noisy(outputs, levels_of_noise, "value", observe)
             if drift or observe:
@@ -162,7 +179,7 @@ class Twin:
                 self._model = PointModel(drift, observe, parameters, moving, inputs, shown, constants, define, plan, name)
                 self.name = self._model.name
                 return
-            units = inputs if isinstance(inputs, Mapping) else _units(inputs)
+            units = inputs if isinstance(inputs, Mapping) else units_of("inputs", inputs)
             self._text = Text(name or "twin", parameters, moving, units, shown, constants, define, events, plan)
             self.name = self._text.name
             return
@@ -234,7 +251,7 @@ class Twin:
         """
         with _Call(self) as call:
             files = call.records(records, columns)
-            options = [*call.subject(), *call.columns(columns), *(["--profile"] if profile else [])]
+            options = [*call.subject(), *call.columns(columns), *_flags(profile=profile)]
             folder, text = call.folder("fit", [*files, *options], seed, out)
             pictures = sorted(folder.glob("overlay*.svg"), key=lambda path: (len(path.name), path.name))
             report = Report(text, pictures=tuple(call.read(path) for path in pictures))
@@ -282,7 +299,7 @@ class Twin:
         with _Call(self) as call:
             files = call.records(records, columns)
             options = [*call.subject(), *call.columns(columns), *_option("--calibrate", calibrate, 0)]
-            options += ["--quick"] * quick + ["--step-of-record"] * step_of_record
+            options += _flags(quick=quick, step_of_record=step_of_record)
             if validation is not None:
                 options += ["--validation", call.record("validation", validation, columns)]
             excluded = [without] if isinstance(without, str) else _texts("without", without or ())
@@ -290,7 +307,7 @@ class Twin:
                 # The noise level of such a twin is fitted in every hypothesis. As an effect it would count twice, and be a gap.
                 excluded.append("sensor-noise")
             if excluded:
-                options += ["--without", ",".join(excluded)]
+                options.append(f"--without={','.join(excluded)}")
             folder, text = call.folder("diagnose", [*files, *options], seed, out)
             report = Report(text, page=call.read(folder / "report.html"))
             return Diagnosis._of(call.json(folder / "report.json"), report)
@@ -320,7 +337,7 @@ class Twin:
             Its file is an argument of `estimate`.
         """
         with _Call(self) as call:
-            options = [*call.subject(noise=True), "--out", word(out), *_option("--bank-size", bank_size, 1), *_option("--epochs", epochs, 1)]
+            options = [*call.subject(noise=True), "--out", word(out, "out"), *_option("--bank-size", bank_size, 1), *_option("--epochs", epochs, 1)]
             raw = json.loads(call.run("pretrain", [*options, "--json"], seed))
             return Estimator._of(raw, Path(out))
 
@@ -358,12 +375,12 @@ class Twin:
         Estimate
         """
         with _Call(self) as call:
-            options = [call.record("record", record, columns), *call.columns(columns), "--estimator", word(estimator)]
+            options = [call.record("record", record, columns), *call.columns(columns), "--estimator", word(estimator, "estimator")]
             # An estimator of other equations would answer, too.
             options += call.subject(noise=True) if self._model is None else []
             if validation is not None:
                 options += ["--validation", call.record("validation", validation, columns)]
-            options += ["--always-refine"] * always_refine + ["--step-of-record"] * step_of_record
+            options += _flags(always_refine=always_refine, step_of_record=step_of_record)
             folder, text = call.folder("estimate", options, seed, out)
             report = Report(text, pictures=(call.read(folder / "overlay.svg"),))
             return Estimate._of(call.json(folder / "estimate.json"), report)
@@ -405,15 +422,14 @@ class Twin:
             The record; a DataFrame if `inputs` is one.
         """
         with _Call(self) as call:
-            given = mapping("parameters", parameters, "name: number")
+            given = named("parameters", parameters, "name: number")
             values = {name: number(f"parameters: {name}", value, "give a number") for name, value in given.items()}
             theta = ",".join(f"{name}={value!r}" for name, value in values.items())
             file = call.path / "simulated.csv"
-            options = [*call.subject(noise=True), "--theta", theta, "--out", str(file)]
+            options = [*call.subject(noise=True), f"--theta={theta}", "--out", str(file)]
             if inputs is not None:
                 options += ["--input", call.record("input", inputs, None, driven=True)]
-            if noise_free:
-                options.append("--noise-free")
+            options += _flags(noise_free=noise_free)
             call.run("simulate", options, seed)
             model = self._model or self._text
             record = _records.read(file, list(model.inputs) if model else [], list(model.outputs) if model else [])
@@ -477,7 +493,7 @@ class Twin:
         """
         with _Call(self) as call:
             options = [*call.subject(noise=True), *_option("--trials", trials, 1)]
-            options += ["--detection-only"] * detection_only + ["--validation"] * validation
+            options += _flags(detection_only=detection_only, validation=validation)
             if like is not None:
                 options += ["--like", call.record("like", like, columns), *call.columns(columns)]
             folder, text = call.folder("withheld", options, seed, out)
@@ -497,7 +513,7 @@ class _Call:
     def __enter__(self) -> _Call:
         with ExitStack() as stack:
             self.path = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="truetwin-")))
-            self.names = Names(self.path)
+            self.names = Names(self.path, in_arguments=self._twin._study is None)
             if self._model is not None:
                 self._model.failure = None
                 self._server = stack.enter_context(Server(self._model))
@@ -526,13 +542,13 @@ class _Call:
 
     def columns(self, columns: Mapping[str, str] | None) -> list[str]:
         """Return the option that names columns."""
-        return ["--columns", _records.columns_of(columns)] if columns else []
+        return [f"--columns={_records.columns_of(columns)}"] if columns else []
 
     def subject(self, noise: bool = False) -> list[str]:
         """Return the options that name the twin."""
         twin = self._twin
         if twin._study is not None:
-            return ["--study", word(twin._study)]
+            return ["--study", str(twin._study)]
         if twin._text is not None:
             file = self.path / "twin.toml"
             file.write_text(twin._text.text, encoding="utf-8")
@@ -544,6 +560,8 @@ class _Call:
         if noise and twin._noise and isinstance(self._model, Model):
             study = self.path / "study.toml"
             study.write_text(_study(self._model, twin._noise), encoding="utf-8")
+            # It holds the noise alone, and is no file of the user.
+            self.names.say(f"{study}: ", "")
             return ["--study", str(study)]
         return []
 
@@ -559,7 +577,7 @@ class _Call:
             return self.names.plain(_process.run(words, environment, self.names, answers=answers))
         except TruetwinError as error:
             failure = self._model.failure if self._model else error.__cause__
-            raise type(error)(self.names.message(error.line), error.exit_code) from failure
+            raise type(error)(one_line(self.names.message(error.line)), error.exit_code) from failure
 
     def read(self, path: Path) -> str:
         """Return the text of a result in the words of the user."""
@@ -568,12 +586,19 @@ class _Call:
     def json(self, path: Path) -> Json:
         """Return a result of the program in the words of the user."""
         raw: Json = json.loads(self.read(path))
+        for warning in raw.get("warnings", ()):
+            warning.update({key: self.names.argued(warning[key]) for key in ("what", "remedy")})
         return raw
 
     def folder(self, verb: str, options: Sequence[str], seed: int, out: Path_ | None) -> tuple[Path, str]:
         """Run a verb that fills a folder; return the folder and what it prints."""
         folder = self.path / "result" if out is None else Path(out)
-        return folder, self.run(verb, [*options, "--out", word(folder)], seed)
+        return folder, self.run(verb, [*options, "--out", word(folder, "out")], seed)
+
+
+def _flags(**given: bool) -> list[str]:
+    """Return the options of the arguments that are true."""
+    return [f"--{name.replace('_', '-')}" for name, value in given.items() if flag(name, value)]
 
 
 def _texts(what: str, value: Any) -> list[str]:
@@ -585,7 +610,7 @@ def _texts(what: str, value: Any) -> list[str]:
 
 
 def _names_of(entries: States) -> list[str]:
-    return list(entries if isinstance(entries, Mapping) else _units(entries))
+    return list(entries if isinstance(entries, Mapping) else listed("states or outputs", entries))
 
 
 def _noise_levels(noise: float | Mapping[str, Any] | None, outputs: States, states: Sequence[str] = (), expressions: bool = False) -> dict[str, Any]:
@@ -603,8 +628,10 @@ def _noisy(entries: States, levels: Mapping[str, Any], key: str, function: Equat
     # What a function computes has a unit in place of an expression.
     key = "unit" if function else key
     noisy: dict[str, Entry] = {}
-    for name, entry in (entries if isinstance(entries, Mapping) else dict.fromkeys(_units(entries), {})).items():
+    for name, entry in (entries if isinstance(entries, Mapping) else dict.fromkeys(_names_of(entries), {})).items():
         level = levels.get(name)
+        if level is not None and isinstance(entry, Mapping) and "noise" in entry:
+            raise ValueError(f"noise of {name} is given twice, here and in its entry; give one")
         noisy[name] = entry if level is None else {**(entry if isinstance(entry, Mapping) else {key: entry}), "noise": level}
     return noisy
 

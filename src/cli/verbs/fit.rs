@@ -36,7 +36,6 @@ impl Verb for Fit {
         let folder = output::asked_folder(&self.out)?;
         let study = context.study(&self.subject)?;
         let (records, _) = records::read(self.columns.reader(&study), &self.records, None)?;
-        records::warn_of_times(&study, self.records.iter().zip(&records), context.seed);
         let settings = FitSettings {
             seed: context.seed,
             draws: self.draws.count()?,
@@ -46,6 +45,9 @@ impl Verb for Fit {
         };
         stop::let_end();
         let fit = study.fit_with(&records, &settings, context.progress);
+        let fit = fit.inspect_err(|_| {
+            records::warn_of_times(&study, self.records.iter().zip(&records), context.seed);
+        });
         let fit = fit.map_err(|e| Failure::of_records(e, Failure::from, &self.records, None))?;
         let provenance = Provenance::new(context).files("record", &self.records);
         let json = provenance.on(fit.json(&study));

@@ -402,6 +402,7 @@ fn states(model: &Model) -> Result<Scales, StudyError> {
     Ok(Scales {
         records: model.problem.records.clone(),
         states: model.states()?,
+        before: vec![],
         outline: model.problem.outline(),
         rates: vec![],
         defined: vec![],

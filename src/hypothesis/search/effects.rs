@@ -79,9 +79,7 @@ fn switched_off(problem: &Problem, effects: &[Effect]) -> Problem {
 /// The effects of the study as terms that the twin has already.
 fn own_terms(model: &Model, effects: &[Effect]) -> Result<Vec<Term>, FilterError> {
     let theta = model.theta();
-    let records = model.problem.records.clone();
-    let outline = model.problem.outline();
-    let scales = Scales::new(&model.base, &theta, records, model.states()?, outline);
+    let scales = Scales::new(&model.base, &theta, &model.problem, model.states()?);
     let (dt, duration) = (scales.dt(), scales.duration());
     let dense = (SEARCH.highest_frequency / dt * duration * TERM.frequencies_per_cycle) as usize;
     let dense = (2..=dense.clamp(2, SEARCH.most_frequencies))

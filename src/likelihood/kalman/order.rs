@@ -1,16 +1,18 @@
 //! Order in which a filter takes the values of a record.
 
 use super::{FilterError, Kalman};
+use crate::twin::seconds_before;
 use std::sync::Arc;
 
 /// Values of a record beside the states that they show: those of an output with a dead time come so many samples earlier.
 ///
 /// ```text
-/// rows before the first   y_j(0) … y_j(d_j − 1)    which show the start, as the row after them does
-/// row k                   y_j(k + d_j)             missing behind the end of the record
+/// row k   y_j(k + d_j)   missing behind the end of the record
 /// ```
 ///
-/// Where steps vary, each value of such an output has a row of its own, at the first sample that is no more than the dead time before it:
+/// Rows before the first show the states of the steps that lead to it, or the start where these begin later.
+///
+/// Where steps vary, each value of such an output has a row of its own, at the first sample or step that is no more than the dead time before it:
 ///
 /// ```text
 /// y_j(k)   behind the others of row i:   t_i ≥ t_k − d_j > t_{i−1}
@@ -25,6 +27,8 @@ pub(super) struct Order<'k> {
     channels: usize,
     /// Rows before the first.
     before: usize,
+    /// Steps from the start to the first row, of a twin with late outputs.
+    steps_before: usize,
     /// Rows where steps vary and an output is late.
     by_time: Option<Arc<[TimedRow]>>,
     /// `true` if outputs are missing.
@@ -38,11 +42,19 @@ enum Values<'k> {
     Arranged(Arc<[f64]>),
 }
 
-/// A row at a sample: its punctual outputs, or a value of a late one.
+/// A row at a sample, or at a step before the first: its punctual outputs, or a value of a late one.
 #[derive(Clone, Copy)]
 struct TimedRow {
-    sample: usize,
+    place: Place,
     late: Option<LateReading>,
+}
+
+/// What a row shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Place {
+    /// The state where this step from the start to the first row begins.
+    Before(usize),
+    Sample(usize),
 }
 
 /// A value that the record has at a later sample.
@@ -50,7 +62,7 @@ struct TimedRow {
 struct LateReading {
     output: usize,
     sample: usize,
-    /// Time in seconds from the sample that is shown to that of the record.
+    /// Time in seconds from what is shown to the sample of the record.
     after: f64,
 }
 
@@ -66,11 +78,16 @@ impl<'k> Order<'k> {
         }
         let dead_time = (kalman.twin).dead_time(theta, kalman.record.drive().dt());
         let before = dead_time.iter().copied().max().unwrap_or(0);
+        let steps_before = match before {
+            0 => 0,
+            _ => seconds_before(&kalman.twin, kalman.record.drive()).len(),
+        };
         let mut order = Self {
             dead_time,
             values: Values::Own(kalman.record.values()),
             channels: kalman.channels,
             before,
+            steps_before,
             by_time: None,
             gaps: kalman.gaps || before > 0,
         };
@@ -82,35 +99,44 @@ impl<'k> Order<'k> {
 
     /// Rows of a record whose steps vary, its outputs late by so many seconds.
     fn by_time(kalman: &'k Kalman<'_>, delays: &[f64]) -> Self {
-        let times = kalman.record.drive().times();
+        let drive = kalman.record.drive();
+        let (times, ahead) = (drive.times(), seconds_before(&kalman.twin, drive));
         let (mut rows, mut dead_time) = (vec![], vec![0; kalman.channels]);
         for (sample, time) in times.iter().enumerate() {
-            rows.push(TimedRow { sample, late: None });
+            rows.push(TimedRow {
+                place: Place::Sample(sample),
+                late: None,
+            });
             for (output, delay) in delays.iter().enumerate().filter(|(_, d)| **d > 0.0) {
                 let shown = times.partition_point(|t| *t < time - delay);
                 dead_time[output] = dead_time[output].max(sample - shown).max(1);
-                // Before the first row, its value stands.
-                let after = match shown {
-                    0 => f64::INFINITY,
-                    shown => time - times[shown],
+                let step = ahead.partition_point(|ahead| *ahead > delay - time);
+                let (place, after) = match (shown, step) {
+                    (1.., _) => (Place::Sample(shown), time - times[shown]),
+                    // Before the start, its value stands.
+                    (0, 0) if ahead.is_empty() => (Place::Sample(0), f64::INFINITY),
+                    (0, 0) => (Place::Before(0), f64::INFINITY),
+                    (0, step) => match ahead.get(step) {
+                        Some(ahead) => (Place::Before(step), time + ahead),
+                        None => (Place::Sample(0), *time),
+                    },
                 };
                 let late = LateReading {
                     output,
                     sample,
                     after,
                 };
-                rows.push(TimedRow {
-                    sample: shown,
-                    late: Some(late),
-                });
+                let late = Some(late);
+                rows.push(TimedRow { place, late });
             }
         }
-        rows.sort_by_key(|row| row.sample);
+        rows.sort_by_key(|row| row.place);
         let mut order = Self {
             dead_time,
             values: Values::Own(&[]),
             channels: kalman.channels,
             before: 0,
+            steps_before: ahead.len(),
             gaps: true,
             by_time: Some(rows.into()),
         };
@@ -131,6 +157,7 @@ impl<'k> Order<'k> {
             values: Values::Arranged(values.into()),
             channels: self.channels,
             before: 0,
+            steps_before: 0,
             by_time: None,
             gaps: true,
         }
@@ -177,27 +204,37 @@ impl<'k> Order<'k> {
         &self.values()[i * self.channels..(i + 1) * self.channels]
     }
 
-    /// Sample of the state that row i shows.
+    /// What row i shows.
+    #[inline(always)]
+    pub fn place(&self, i: usize) -> Place {
+        match &self.by_time {
+            None => match i.checked_sub(self.before) {
+                Some(k) => Place::Sample(k),
+                None if self.steps_before == 0 => Place::Sample(0),
+                None => Place::Before((self.steps_before + i).saturating_sub(self.before)),
+            },
+            Some(rows) => rows[i].place,
+        }
+    }
+
+    /// Sample of the state that row i shows, the first one for those before it.
     #[inline(always)]
     pub fn state_of(&self, i: usize) -> usize {
-        match &self.by_time {
-            None => i.saturating_sub(self.before),
-            Some(rows) => rows[i].sample,
+        match self.place(i) {
+            Place::Before(_) => 0,
+            Place::Sample(k) => k,
         }
     }
 
-    /// Returns whether row i is the last that shows its sample.
+    /// Returns whether row i is the last that shows its sample or its step.
     #[inline(always)]
-    pub fn ends_sample(&self, i: usize) -> bool {
-        match &self.by_time {
-            None => i >= self.before,
-            Some(rows) => rows
-                .get(i + 1)
-                .is_none_or(|next| next.sample > rows[i].sample),
-        }
+    pub fn is_last(&self, i: usize) -> bool {
+        i >= self.before && self.by_time.is_none()
+            || i + 1 == self.rows()
+            || self.place(i + 1) > self.place(i)
     }
 
-    /// Time in seconds from the sample that row i shows to where its late output is read; `None` where whole samples tell it.
+    /// Time in seconds from what row i shows to where its late output is read; `None` where whole samples tell it.
     #[inline(always)]
     pub fn read_after(&self, i: usize) -> Option<f64> {
         let late = self.by_time.as_ref()?[i].late;
@@ -217,16 +254,14 @@ impl<'k> Order<'k> {
     /// Sample at which the record has output j of row i, perhaps behind its end; `None` where the row before the first has none.
     pub fn sample_of(&self, i: usize, j: usize) -> Option<usize> {
         if let Some(rows) = &self.by_time {
-            return match rows[i].late {
-                Some(late) => (late.output == j).then_some(late.sample),
-                None => (!self.is_late(j)).then_some(rows[i].sample),
+            return match (rows[i].late, rows[i].place) {
+                (Some(late), _) => (late.output == j).then_some(late.sample),
+                (None, Place::Sample(k)) => (!self.is_late(j)).then_some(k),
+                (None, Place::Before(_)) => None,
             };
         }
         let late = self.dead_time.get(j).copied().unwrap_or(0);
-        match i.checked_sub(self.before) {
-            Some(k) => Some(k + late),
-            None => (i < late).then_some(i),
-        }
+        (i + late).checked_sub(self.before)
     }
 }
 

@@ -6,13 +6,14 @@ use super::gaussian::{Belief, Columns, Root, regular};
 use super::moments::{Moment, Moments};
 use super::normal::clip::clip;
 use super::number::FilterNumber;
-use super::order::Order;
+use super::order::{Order, Place};
 use super::size::{Any, Buffer, Size};
 use super::update::{MeasuredRow, Readings, Update};
 use super::{FilterError, Kalman};
 use crate::math::{Condition, Number};
 use crate::twin::{Acting, LanePlaces, LevelFactors, Now, SimulationError};
 pub(super) use sink::{Innovation, Sink};
+use std::ops::Range;
 
 /// The state given the rows so far; apart from the buffers, of which calls to the twin see some, so that it can stay in registers.
 struct FilterState<S: Size, N: Number> {
@@ -205,8 +206,11 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         state.set(self.state.belief(n));
         for i in self.row..end {
             self.measure(i, &mut state, &mut root, sink)?;
-            if i + 1 < self.order.rows() && self.order.ends_sample(i) {
-                self.go_on(self.order.state_of(i), &mut state, &mut root, sink);
+            if i + 1 < self.order.rows() && self.order.is_last(i) {
+                match self.order.place(i) {
+                    Place::Sample(k) => self.go_on(k, &mut state, &mut root, sink),
+                    Place::Before(step) => self.go_to_row(step, i + 1, &mut state),
+                }
             }
         }
         self.state.set(state.belief(n));
@@ -235,18 +239,31 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 *to.lane_mut(lane) = *value;
             }
         }
-        // Filters side by side have as many steps before their first rows.
-        let steps = self.jobs[0].acting.steps_before();
-        if steps > 0 {
-            let any = Any {
-                states: n,
-                outputs: self.size.outputs(),
-            };
-            let mut state = FilterState::zero(n);
-            state.set(self.state.belief(n));
-            Pass::prepared(any, self.jobs).run_to_first_row(steps, &mut state);
-            self.state.set(state.belief(n));
+        let mut state = FilterState::zero(n);
+        state.set(self.state.belief(n));
+        self.go_to_row(0, 0, &mut state);
+        self.state.set(state.belief(n));
+    }
+
+    /// Carries the state from the start of this step before the first row to row i. Filters side by side have as many such steps.
+    #[inline(always)]
+    fn go_to_row(&self, step: usize, i: usize, state: &mut FilterState<S, N>) {
+        let end = match self.order.place(i) {
+            Place::Before(step) => step,
+            Place::Sample(_) => self.jobs[0].acting.steps_before(),
+        };
+        if step == end {
+            return;
         }
+        let n = self.size.states();
+        let any = Any {
+            states: n,
+            outputs: self.size.outputs(),
+        };
+        let mut carried = FilterState::zero(n);
+        carried.set(state.belief(n));
+        Pass::prepared(any, self.jobs).take_steps(step..end, &mut carried);
+        state.set(carried.belief(n));
     }
 
     /// Inputs of sample k, and noise levels there at the mean of the state.
@@ -254,6 +271,14 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
     fn go_to(&mut self, k: usize, state: &FilterState<S, N>) {
         let jobs = self.jobs;
         self.now.each(|lane, now| jobs[lane].acting.go_to(k, now));
+        self.set_noise(state);
+    }
+
+    /// Inputs of a step before the first row, and noise levels there.
+    #[cold]
+    fn go_before(&mut self, step: usize, state: &FilterState<S, N>) {
+        let jobs = self.jobs;
+        (self.now).each(|lane, now| *now = jobs[lane].acting.before(step));
         self.set_noise(state);
     }
 
@@ -282,8 +307,11 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         sink: &mut dyn Sink<N>,
     ) -> Result<(), FilterError> {
         let (n, p) = (self.size.states(), self.size.outputs());
-        let k = self.order.state_of(i);
-        self.go_to(k, state);
+        let place = self.order.place(i);
+        match place {
+            Place::Sample(k) => self.go_to(k, state),
+            Place::Before(step) => self.go_before(step, state),
+        }
         if let Some(time) = self.order.read_after(i) {
             self.now.each(|_, now| now.read_after = Some(time));
         }
@@ -326,7 +354,9 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 row: i,
             },
         );
-        if self.order.ends_sample(i) {
+        if let Place::Sample(k) = place
+            && self.order.is_last(i)
+        {
             sink.filtered(k, state.belief(n));
         }
         Ok(())
@@ -471,14 +501,12 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
 }
 
 impl<N: FilterNumber> Pass<'_, Any, N> {
-    /// Carries the start to the first row. Compiled for no size of its own: these are few steps.
+    /// Carries the state over steps before the first row. Compiled for no size of its own: these are few.
     #[cold]
-    fn run_to_first_row(mut self, steps: usize, state: &mut FilterState<Any, N>) {
+    fn take_steps(mut self, steps: Range<usize>, state: &mut FilterState<Any, N>) {
         let mut root = Root::new(self.size.states());
-        for i in 0..steps {
-            let jobs = self.jobs;
-            (self.now).each(|lane, now| *now = jobs[lane].acting.before(i));
-            self.set_noise(state);
+        for step in steps {
+            self.go_before(step, state);
             self.carry(0, state, &mut root, &mut ());
         }
     }

@@ -58,7 +58,7 @@ pub(crate) fn start_elsewhere(
     beliefs: &Beliefs,
 ) -> Option<StartElsewhere> {
     let twin = twin.equations()?;
-    let theta = without_effects(&twin.outline().parameters);
+    let theta = without_effects(&twin.outline().parameters, beliefs);
     Starts::of(twin, records, beliefs, &theta).elsewhere
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn with_levels(
     };
     let outline = base.outline();
     let records = std::slice::from_ref(record);
-    let theta = without_effects(&outline.parameters);
+    let theta = without_effects(&outline.parameters, beliefs);
     // Sizes make guesses alone, and none is used; starts stay as they are.
     let states = outline.states.len();
     let sizes = RecordSizes {
@@ -119,12 +119,14 @@ pub(crate) fn with_levels(
     Ok(fixed.with([], vec![TwinPart::Drawn { first, values }]))
 }
 
-/// The prior's centre, sizes, lags and delays of effects at zero: what the twin's own motion tells must not hang on a guess of these, and the
-/// centre of a delay's prior may be longer than its law keeps.
-fn without_effects(space: &ParameterSpace) -> Vec<f64> {
+/// The prior's centre, effects off: what the twin's own motion tells must not hang on a guess of these, and the centre of a delay's prior may
+/// be longer than its law keeps.
+fn without_effects(space: &ParameterSpace, beliefs: &Beliefs) -> Vec<f64> {
     (space.iter().zip(space.centre()))
         .map(|(p, centre)| match p.role {
-            Role::Magnitude => p.bounds.clamp(0.0),
+            Role::Magnitude => p
+                .bounds
+                .clamp(beliefs.off.get(&p.name).copied().unwrap_or(0.0)),
             _ => centre,
         })
         .collect()
@@ -164,7 +166,7 @@ fn measured_equations(
     beliefs: &Beliefs,
 ) -> Result<Measured, FilterError> {
     let outline = base.outline();
-    let theta = without_effects(&outline.parameters);
+    let theta = without_effects(&outline.parameters, beliefs);
     let size_of = |j: usize| -> Option<f64> {
         let having = records.iter().filter(|record| record.has_output(j));
         having

@@ -129,7 +129,7 @@ impl Study {
         })
     }
 
-    /// Returns a sentence about a record whose times seem to be in another unit than seconds.
+    /// Returns what shows that a record's times are in another unit than seconds.
     pub(crate) fn mistaken_time(&self, record: &Record, seed: u64) -> Option<String> {
         let noise = Noise::new(seed, "suitability", 0);
         let constants = || {
@@ -137,8 +137,8 @@ impl Study {
             self.time_constants(&self.planned(drive, noise)?)
         };
         let drive = record.drive().first(LIMITS.looked_at);
-        let (_, message) = time::mistaken_unit(self, &drive, constants)?;
-        Some(message)
+        let (_, shown) = time::mistaken_unit(self, &drive, constants)?;
+        Some(shown)
     }
 
     /// A record as the plan has them, simulated at the centre of the prior.

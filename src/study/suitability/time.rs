@@ -17,7 +17,7 @@ const UNITS: [(f64, &str); 6] = [
     (1.0 / 86_400.0, "days"),
 ];
 
-/// Returns the unit that times are in by mistake, so many of which are a second, with a sentence about it; `constants` gives the fastest and the
+/// Returns the unit that times are in by mistake, so many of which are a second, with what shows it; `constants` gives the fastest and the
 /// slowest time constant of the twin, where it can be told.
 pub(super) fn mistaken_unit(
     study: &Study,
@@ -39,13 +39,12 @@ pub(super) fn mistaken_unit(
     };
     let mut units = UNITS.into_iter();
     let (unit, name) = units.find(|(unit, _)| like_plan(*unit, near))?;
-    let message = format!(
-        "a step of {} s, {} s in the study: t seems to be in {name}; {}",
+    let shown = format!(
+        "a step of {} s, {} s in the study: t seems to be in {name}",
         text(step),
-        text(plan),
-        conversion(unit)
+        text(plan)
     );
-    Some((unit, message))
+    Some((unit, shown))
 }
 
 /// Checks the time grid; also returns how many units of the record's time a second is.
@@ -55,7 +54,8 @@ pub(super) fn check(
     constants: Option<(f64, f64)>,
 ) -> (Vec<Finding>, f64) {
     let drive = record.drive();
-    if let Some((unit, message)) = mistaken_unit(study, drive, || constants) {
+    if let Some((unit, shown)) = mistaken_unit(study, drive, || constants) {
+        let message = format!("{shown}; {}", conversion(unit));
         return (vec![Finding::warning("time", message)], unit);
     }
     let step = drive.dt();

@@ -32,7 +32,7 @@ pub(crate) use part::{
     Disturbance, Entry, FittedLevels, Follows, LARGEST, Law, LawPart, LawPlace, LevelSource,
     LevelValue, ParameterChange, RateChange, Remember, Seen, SignalChange, StateLimit, TwinPart,
 };
-pub(crate) use simulation::{Acting, DeadTime, check_start};
+pub(crate) use simulation::{Acting, DeadTime, check_start, seconds_before};
 
 use crate::record::{Drive, Signal};
 use crate::twin::integrator::felt;

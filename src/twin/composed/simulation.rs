@@ -93,6 +93,17 @@ pub(crate) struct Acting<'d> {
     before: LeadIn,
 }
 
+/// Seconds from the start of each step before the first row of a drive to that row; none where the start is that row.
+pub(crate) fn seconds_before(twin: &Composed, drive: &Drive) -> Vec<f64> {
+    let first_row = drive.first_time();
+    let Some(Ok(before)) = twin.begins().map(|begun| LeadIn::of(drive, begun)) else {
+        return vec![];
+    };
+    let left = (1..before.steps).rev().map(|left| left as f64 * drive.dt());
+    let all = std::iter::once(first_row - before.begun).chain(left);
+    all.take(before.steps).collect()
+}
+
 /// Checks that the start of a twin does not belong to a time after the first row of a drive.
 pub(crate) fn check_start(twin: &Composed, drive: &Drive) -> Result<(), String> {
     (twin.begins()).map_or(Ok(()), |begun| LeadIn::of(drive, begun).map(drop))
@@ -308,7 +319,7 @@ pub(super) fn simulate(
         .collect();
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let mut x = vec![0.0; n];
-    let mut outputs = vec![0.0; samples * p];
+    let (mut outputs, mut before) = (vec![0.0; samples * p], vec![0.0; p]);
     // One step, and the noise of it.
     let mut carry = |now: &Now<'_>, q: &[f64], x: &mut [f64]| {
         twin.step(now, x, work);
@@ -339,6 +350,10 @@ pub(super) fn simulate(
             q.fill(0.0);
             r.fill(0.0);
             twin.noise(&now, &x, &mut q, &mut r);
+        }
+        if dead_time.is_any() {
+            twin.observe(&now, &x, &mut before);
+            dead_time.hold_back(now.t, &mut before);
         }
         carry(&now, &q, &mut x)?;
     }
@@ -419,9 +434,14 @@ impl DeadTime {
         Self { late, ..Self::NONE }
     }
 
-    /// Replaces the outputs of the next sample, at time `t`, by those that are shown at it.
+    /// Returns whether an output is late.
+    fn is_any(&self) -> bool {
+        !self.late.is_empty()
+    }
+
+    /// Replaces the outputs of the next sample, or of the next step before the first, at time `t`, by those that are shown at it.
     pub fn hold_back(&mut self, t: f64, y: &mut [f64]) {
-        if self.late.is_empty() {
+        if !self.is_any() {
             return;
         }
         let (p, k) = (y.len(), self.times.len());

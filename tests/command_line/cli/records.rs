@@ -298,9 +298,21 @@ fn a_record_is_checked_against_a_twin() {
     assert_eq!(value["suits"], false);
     let few = format!("ms;u;y\n{}\n", lines[..20].join("\n"));
     let few = place.write("few.csv", few);
-    let warned = truetwin(&["fit", &few, "--twin", "tanks", "--columns", "t=ms"]).stderr;
-    let warning = "few.csv: a step of 500 s, 0.5 s in the study: t seems to be in milliseconds";
-    assert!(String::from_utf8(warned).unwrap().contains(warning));
+    let fit = json(&[
+        "fit",
+        &few,
+        "--twin",
+        "tanks",
+        "--columns",
+        "t=ms",
+        "--json",
+    ]);
+    let warnings = fit["warnings"].as_array().unwrap();
+    let warning = warnings.iter().find(|w| w["code"] == "time-unit").unwrap();
+    assert_eq!(
+        warning["what"],
+        "a step of 500 s, 0.5 s in the study: t seems to be in milliseconds"
+    );
     let other = done(&["check", &record, "--twin", "van-der-pol"]);
     assert!(
         other.contains("failure   channels") && other.contains("1 input, the twin has 0"),

@@ -3,7 +3,10 @@
 use crate::effect::{Catalogue, Effect, EffectKind, augment};
 use crate::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{Integrator, Noise, Now, Outline, Parameter, StateSpace, Twin, fix};
+use crate::twin::{
+    Adaptation, Integrator, Noise, Now, Outline, Parameter, StartLevel, StateSpace, Twin, adapt,
+    fix,
+};
 
 const LATE: usize = 6;
 const STEP: f64 = 0.2;
@@ -208,5 +211,45 @@ fn rows_that_are_left_out_are_rows_without_values() {
         let [one, other] = [&whole, &fewer]
             .map(|record| with(&twin, record, |k| k.log_likelihood(&theta).unwrap()));
         assert!((one - other).abs() < 1e-4, "{one} {other}");
+    }
+}
+
+/// A record that begins after the start of its twin: what is late shows the states on the way to the first row, in a run and in a filter.
+#[test]
+fn a_late_output_shows_what_was_before_the_first_row() {
+    let seen = |t: f64| 1.0 / 0.7 + (1.0 - 1.0 / 0.7) * (-0.7 * t.max(0.0)).exp();
+    let start = StartLevel::Declared {
+        mean: 1.0,
+        std: 0.0,
+        at: Some(0.0),
+    };
+    let adaptation = Adaptation {
+        start: [("x".to_owned(), start)].into(),
+        ..Adaptation::default()
+    };
+    let delays = [LATE as f64 * STEP, 0.53];
+    for (delay, is_even) in delays.into_iter().flat_map(|d| [(d, true), (d, false)]) {
+        let twin = adapt(late_by(QUIET, delay), &adaptation, STEP).unwrap();
+        for begins in [0.05, 0.6, 2.3] {
+            let rows = (0..40).filter(|k| is_even || k % 7 != 5);
+            let times: Vec<f64> = rows.map(|k| begins + STEP * f64::from(k)).collect();
+            let inputs = Signal::from_elem((times.len(), 1), 1.0);
+            let drive = Drive::with_times(&times, inputs).unwrap();
+            let run = twin.free_run(&[0.7], &drive).unwrap();
+            for (k, t) in times.iter().enumerate() {
+                let off = run[[k, 1]] - seen(t - delay);
+                assert!(
+                    off.abs() < 3e-3,
+                    "{delay} {is_even} {begins}: row {k}: {off}"
+                );
+            }
+            let record = Record::new(drive, run.clone()).unwrap();
+            let filtered = with(&twin, &record, |k| k.filter(&[0.7]).unwrap());
+            let off = filtered
+                .innovations
+                .iter()
+                .fold(0.0, |off: f64, d| off.max(d.abs()));
+            assert!(off < 1e-6, "{delay} {is_even} {begins}: {off}");
+        }
     }
 }
