@@ -48,7 +48,7 @@ pub(super) struct Subject {
 #[derive(Debug, Clone, Args)]
 pub(super) struct FileColumns {
     /// Column of the record file for each name in the twin, as in t=time,u=pump,y=level [default: t, u or u1,u2,…, y or y1,y2,…,
-    /// or [record] columns of the study].
+    /// or those of [record] columns in a study that is given].
     #[arg(long, value_name = "NAME=COLUMN,..")]
     columns: Option<Columns>,
 }

@@ -52,7 +52,7 @@ impl Remedy for SimulationError {
             return more_time(self);
         }
         Some(
-            "a state, an output or a level of noise is no finite number there: other values of --theta or of an effect; for equations, [record] substeps or integrator of the study file".into(),
+            "a state, an output or a level of noise is no finite number there: other values of --theta or of an effect; for rates, [record] substeps or integrator of the study file".into(),
         )
     }
 
@@ -110,7 +110,7 @@ impl Remedy for RecordError {
             Self::OneStep { .. } => "`truetwin resample R.csv --step S --out R2.csv`".into(),
             Self::Channels { .. } => "`truetwin twins` lists the twins".into(),
             Self::Columns { .. } => {
-                "--columns t=NAME,u=NAME,y=NAME, or [record] columns of a study file, takes other names".into()
+                "--columns t=NAME,u=NAME,y=NAME takes other names".into()
             }
             _ => return None,
         })

@@ -24,7 +24,7 @@ pub(crate) const NO_BETTER: &str = "no-better-than-constant";
 const LEAVE_OUT: &str = "leave the effect out: the record does not ask for it";
 
 /// Remedy of each reason.
-const REMEDIES: [(&str, &str); 24] = [
+const REMEDIES: [(&str, &str); 25] = [
     (
         "at-bound",
         "widen its bounds if other values are possible; its error means little here",
@@ -44,6 +44,10 @@ const REMEDIES: [(&str, &str); 24] = [
     (
         STILL_OUTPUT,
         "a sensor that is stuck tells nothing of the twin; take a record in which it moves",
+    ),
+    (
+        "event-outside",
+        "give its times on the clock of the records",
     ),
     (
         "first-rows",
@@ -139,6 +143,20 @@ impl Warning {
             "step-matters",
             format!("the step{of} is {fault}"),
         ))
+    }
+
+    /// Events of a twin at times that no record has.
+    pub(crate) fn events_outside(twin: &Twin, theta: &[f64], records: &[Record]) -> Vec<Self> {
+        let twin = twin.equations().into_iter();
+        let names = twin.flat_map(|twin| twin.events_outside(theta, records));
+        names
+            .map(|name| {
+                Self::new(
+                    "event-outside",
+                    format!("{name} never acts: these lie outside the records"),
+                )
+            })
+            .collect()
     }
 
     /// Times of record `r` of so many that are in another unit than seconds, by what shows it.
@@ -397,9 +415,15 @@ impl<'a> Doubts<'a> {
         }
     }
 
-    /// Warns of channels that never move.
+    /// Warns of channels that never move, and of events that never act.
     pub fn still(&mut self) {
         let problem = self.problem;
+        let theta = problem.of_record(0, self.theta);
+        (self.all).extend(Warning::events_outside(
+            &problem.twin,
+            &theta,
+            &problem.records,
+        ));
         self.all
             .extend(Warning::still(&problem.twin.signals(), &problem.records));
     }

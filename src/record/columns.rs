@@ -30,7 +30,12 @@ impl TryFrom<BTreeMap<String, String>> for Columns {
         // A date reads as a table of one key of the parser's own.
         match columns.keys().any(|key| key.starts_with('$')) {
             true => Err("found a date, expected a table of columns, such as t = \"time\""),
-            false => Ok(Self(columns)),
+            // Cells of a header have no blanks at their ends either.
+            false => Ok(Self(
+                (columns.into_iter())
+                    .map(|(key, column)| (key, column.trim().to_owned()))
+                    .collect(),
+            )),
         }
     }
 }
@@ -50,6 +55,20 @@ impl Columns {
             let same = header.iter().filter(|other| other == name).count();
             same > 1 || name.trim().is_empty()
         };
+        let is_outputs = |key: &String| {
+            usual_name(key, Some(signals)).is_some_and(|usual| usual.starts_with('y'))
+        };
+        let untold = (signals
+            .outputs
+            .iter()
+            .zip(&header[1 + signals.inputs.len()..]))
+        .find(|(output, column)| **column != output.name && !self.0.values().any(|c| c == *column));
+        if let Some((output, _)) = untold.filter(|_| self.0.keys().any(is_outputs)) {
+            return Err(format!(
+                "columns: \"{}\" has none, and its own name cannot be one; give it one, too",
+                quoted(&output.name)
+            ));
+        }
         match header.iter().find(is_odd) {
             Some(name) => Err(format!(
                 "columns: \"{}\" is no column, or that of two channels; give each channel a column of its own",
@@ -67,9 +86,41 @@ impl Columns {
             found.map(|(_, column)| column.clone())
         };
         let usual = channels::columns(signals.inputs.len(), signals.outputs.len());
-        (usual.iter().zip(channels::header(signals, true)))
-            .map(|(usual, own)| given(usual).unwrap_or(own))
-            .collect()
+        let is_read = |name: &String| {
+            self.is_by_name(name, Some(signals)) && !self.0.values().any(|column| column == name)
+        };
+        let outputs = usual.len() - signals.outputs.len();
+        (usual
+            .iter()
+            .zip(channels::header(signals, true))
+            .enumerate())
+        .map(|(at, (usual, header))| {
+            let own = at.checked_sub(outputs).map(|j| &signals.outputs[j].name);
+            let own = own.filter(|own| is_read(own)).cloned();
+            given(usual).or(own).unwrap_or(header)
+        })
+        .collect()
+    }
+
+    /// Returns whether a column is an output of the twin by its name alone, as each is that is not given beside others that are.
+    fn is_by_name(&self, column: &str, signals: Option<&Signals>) -> bool {
+        let Some(signals) = signals.filter(|signals| signals.outputs.len() > 1) else {
+            return false;
+        };
+        let Some(usual) = usual_name(column, Some(signals)) else {
+            return false;
+        };
+        let given = || {
+            self.0
+                .keys()
+                .filter_map(|key| usual_name(key, Some(signals)))
+        };
+        // As cells of a header are.
+        let is_cell = column.trim() == column && !column.contains(['\r', '\n']);
+        is_cell
+            && signals.outputs.iter().any(|output| output.name == column)
+            && given().any(|given| given.starts_with('y'))
+            && !given().any(|given| given == usual)
     }
 
     /// The same without those of outputs, for files of time and inputs.
@@ -103,7 +154,7 @@ impl Columns {
                     return Ok(given);
                 }
                 let usual = usual_name(column, signals).unwrap_or_else(|| (*column).to_owned());
-                let is_replaced = usual.starts_with(is_given);
+                let is_replaced = usual.starts_with(is_given) && !self.is_by_name(column, signals);
                 let is_other = !is_usual(&usual) || is_replaced;
                 Ok((self.is_empty() || !is_other).then_some(usual))
             })
@@ -329,7 +380,7 @@ fn unquoted(name: &str) -> String {
     let inner = name
         .strip_prefix('"')
         .and_then(|name| name.strip_suffix('"'));
-    inner.map_or(name.to_owned(), |inner| inner.replace("\"\"", "\""))
+    inner.map_or(name.to_owned(), |inner| inner.trim().replace("\"\"", "\""))
 }
 
 /// Returns the two columns of a header that are one channel of the twin, under different names; or one that is two channels.
@@ -428,6 +479,11 @@ mod tests {
         assert_eq!(names("", "t,u,note").unwrap(), ["t", "u", "note"]);
         assert_eq!(names("lower=a", "t,a").unwrap(), ["t", "y2"]);
         assert_eq!(names("lower=a,upper=b", "t,a").unwrap(), ["t", "y2"]);
+        // Beside an output that is given, another one is found by its own name alone: y1 may be anything.
+        let beside = names("lower=a", "t,upper,a").unwrap();
+        assert_eq!(beside, ["t", "y1", "y2"]);
+        assert_eq!(names("lower=a", "t,y1,a").unwrap(), ["t", "", "y2"]);
+        assert_eq!(names("lower=\" a \"", "t,a").unwrap(), ["t", "y2"]);
     }
 
     /// Whatever the channels are called, the reader takes the columns of the header for the channels that they are written from.
@@ -445,7 +501,7 @@ mod tests {
                 .wrapping_add(1_442_695_040_888_963_407);
             (state >> 33) as usize % n
         };
-        let mut own = 0;
+        let (mut own, mut partly) = (0, 0);
         for trial in 0..500 {
             let mut drawn = |count: usize| {
                 let mut names: Vec<&str> = vec![];
@@ -478,18 +534,26 @@ mod tests {
             let inputs = Signal::from_shape_fn((3, signals.inputs.len()), |(k, j)| value(k, j));
             let outputs = Signal::from_shape_fn((3, signals.outputs.len()), |(k, j)| -value(k, j));
             let record = Record::new(Drive::new(0.5, inputs).unwrap(), outputs).unwrap();
-            let names = Columns::default().header(&signals);
-            record.write_named(&path, &names).unwrap();
-            std::fs::rename(&path, &moved).unwrap();
-            let mut reader = RecordReader::new(Columns::default(), Some(signals.clone()));
-            let read = reader.record(&moved).unwrap();
-            assert_eq!(
-                read.drive().inputs(),
-                record.drive().inputs(),
-                "{signals:?}"
-            );
-            assert_eq!(read.outputs(), record.outputs(), "{signals:?}");
+            // One of several outputs may have a column of another name.
+            let given = format!("y{}", 1 + below(signals.outputs.len()));
+            let mut all = vec![Columns::default()];
+            if signals.outputs.len() > 1 {
+                all.push(Columns([(given, "logged".to_owned())].into()));
+            }
+            for columns in all.into_iter().filter(|all| all.check(&signals).is_ok()) {
+                partly += usize::from(!columns.is_empty());
+                record
+                    .write_named(&path, &columns.header(&signals))
+                    .unwrap();
+                std::fs::rename(&path, &moved).unwrap();
+                let mut reader = RecordReader::new(columns, Some(signals.clone()));
+                let read = reader.record(&moved).unwrap();
+                let inputs = read.drive().inputs();
+                assert_eq!(inputs, record.drive().inputs(), "{signals:?}");
+                assert_eq!(read.outputs(), record.outputs(), "{signals:?}");
+            }
         }
+        assert!(partly > 100, "only {partly} headers have a given column");
         assert!(own > 100, "only {own} headers need names of their own");
     }
 

@@ -373,7 +373,9 @@ fn channels(all: &[ColumnName<'_>], signals: Option<&Signals>) -> Result<(usize,
     }
     match names.contains(&"t") {
         true => Ok((inputs, outputs)),
-        false => Err("column t is missing; add the time of each row in seconds".into()),
+        false => Err(
+            "column t is missing; add the time of each row in seconds, or name its column t".into(),
+        ),
     }
 }
 

@@ -226,11 +226,7 @@ impl RecordPlan {
         if inputs.iter().all(|other| other.name != usual) {
             names.push(&usual);
         }
-        let drive = (RecordReader::default().input(path, &names)).map_err(|error| match error {
-            // No other names are taken here.
-            RecordError::Columns { .. } => StudyError::Plan(error.to_string()),
-            error => error.into(),
-        })?;
+        let drive = (RecordReader::default().input(path, &names)).map_err(of_input)?;
         check_one_step(path, &drive)?;
         let (step, samples) = (drive.dt(), drive.samples());
         if (step - self.step).abs() > UNIFORM * self.step || samples != self.samples {
@@ -286,6 +282,14 @@ fn check_one_step(path: &Path, drive: &Drive) -> Result<(), StudyError> {
     }
 }
 
+/// The error of a file of one input, whose columns have no other names.
+fn of_input(error: RecordError) -> StudyError {
+    match error {
+        RecordError::Columns { .. } => StudyError::Plan(error.to_string()),
+        error => error.into(),
+    }
+}
+
 /// Step and length of records, with the first file that has them; none without a file.
 pub(super) type FilesGrid<'p> = Option<(&'p Path, f64, usize)>;
 
@@ -307,7 +311,7 @@ pub(super) fn grid_of_files(
                 error => error.into(),
             }),
             // The twin, whose names tell which column it is, may not be known yet.
-            Some(_) => RecordReader::default().input(path, &[]).map_err(Into::into),
+            Some(_) => RecordReader::default().input(path, &[]).map_err(of_input),
         };
         let drive = drive.map_err(|error| (input, error))?;
         let (step, samples) = (drive.dt(), drive.samples());

@@ -2,6 +2,7 @@
 
 use crate::effect::{Catalogue, augment};
 use crate::equations::Equations;
+use crate::fit::Warning;
 use crate::likelihood::kalman::{FilterSettings, Kalman};
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{DigitalTwin, Noise, Twin};
@@ -105,6 +106,30 @@ fn what_has_no_number_ends_the_run() {
             );
         }
     }
+}
+
+/// An event none of whose times a record has never acts, and is told; the start of the twin may be before the first row.
+#[test]
+fn events_outside_the_records_are_told() {
+    let told = |at: &str, begins: f64| {
+        let text = format!(
+            "[parameters]\nk = {{ prior = [0.1, 1.0] }}\n[states]\nx = {{ rate = \"-k*x\", start = {{ value = 1.0, at = 6.5 }} }}\n\
+             [outputs]\ny = {{ value = \"x\" }}\n[[event]]\nat = {at}\nadd = {{ x = 1.0 }}\n"
+        );
+        let drive = Drive::autonomous(0.1, 40).unwrap().beginning_at(begins);
+        let record = Record::new(drive, Signal::from_elem((40, 1), 1.0)).unwrap();
+        let twin = Twin::new(under("adaptive", &text));
+        Warning::events_outside(&twin, &[0.4], &[record]).len()
+    };
+    for (at, expected) in [
+        ("6.8", 0),
+        ("[1.0, 10.9]", 0),
+        ("[6.4, 11.0]", 1),
+        ("\"11 + k\"", 1),
+    ] {
+        assert_eq!(told(at, 7.0), expected, "{at}");
+    }
+    assert_eq!(told("6.8", 1.7e9), 0, "no more steps than a start allows");
 }
 
 /// Doses at times, of rows and between them, are those of an input that is added at its rows.

@@ -5,7 +5,7 @@
 
 use super::runs::run;
 use crate::math::{deviation, largest};
-use crate::record::Record;
+use crate::record::{Record, Signal};
 use crate::twin::{
     ComposedBlackBox, DigitalTwin, Interval, Noise, Parameter, Role, SensorNoise, SimulationError,
     Twin, TwinPart, WhiteLevel,
@@ -30,14 +30,11 @@ pub(crate) fn measured(
         let noise = Noise::new(0, "silent", sample);
         run(base, &theta, record.drive(), noise)
     };
-    let is_silent = match (one(0)?, one(1)?) {
-        (Some(first), Some(second)) => first == second,
-        _ => false,
-    };
-    let (parameters, outputs): (Vec<Parameter>, Vec<usize>) =
-        levels(base, records, if is_silent { LEAST } else { NONE })
-            .into_iter()
-            .unzip();
+    let runs = [one(0)?, one(1)?];
+    let is_silent = runs[0].is_some() && runs[0] == runs[1];
+    let least = if is_silent { LEAST } else { NONE };
+    let levels = levels(base, records, runs[0].as_ref(), least);
+    let (parameters, outputs): (Vec<Parameter>, Vec<usize>) = levels.into_iter().unzip();
     let twin = Twin::BlackBox(base.clone());
     let entries = twin.entries();
     let levels = (parameters.iter().zip(outputs).enumerate())
@@ -56,23 +53,30 @@ pub(crate) fn measured(
     Ok((twin.with(parameters, vec![white]), is_silent))
 }
 
-/// Deviation, or what is left of it where nothing moves; missing values are left out.
-fn size(values: &[f64]) -> f64 {
-    let values: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
-    let values = values.as_slice();
-    let least = (1e-3 * largest(values)).max(1e-100);
-    deviation(values).max(least)
+/// Deviation of a column, or what is left of it where nothing moves; missing values are left out. None where all is zero.
+fn size(signal: &Signal, column: usize) -> Option<f64> {
+    let values = signal.column(column).into_iter().copied();
+    let values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    let size = deviation(&values).max(1e-3 * largest(&values));
+    (size > 0.0).then_some(size)
 }
 
-/// Levels that are fitted, each with the index of its output.
-fn levels(twin: &ComposedBlackBox, records: &[Record], least: f64) -> Vec<(Parameter, usize)> {
+/// Levels that are fitted, each with the index of its output. A record of zeros tells no size; a `run` of the twin does.
+fn levels(
+    twin: &ComposedBlackBox,
+    records: &[Record],
+    run: Option<&Signal>,
+    least: f64,
+) -> Vec<(Parameter, usize)> {
     let space = twin.parameters();
     (twin.signals().outputs.iter().enumerate())
         .filter(|(_, output)| space.position(&Role::Noise.name(&output.name)).is_err())
         .map(|(j, output)| {
             // Of the first record that has it.
             let having = records.iter().find(|record| record.has_output(j));
-            let size = having.map_or(1.0, |record| size(&record.outputs().column(j).to_vec()));
+            let size = (having.and_then(|record| size(record.outputs(), j)))
+                .or_else(|| size(run?, j))
+                .unwrap_or(1.0);
             let parameter = Parameter {
                 name: Role::Noise.name(&output.name),
                 unit: output.unit.clone(),
@@ -89,8 +93,22 @@ fn levels(twin: &ComposedBlackBox, records: &[Record], least: f64) -> Vec<(Param
 mod tests {
     use super::*;
     use crate::effect::{Catalogue, augment};
-    use crate::record::{Drive, Signal};
+    use crate::record::Drive;
     use crate::twin::fixture::AtOnce;
+
+    /// Zeros tell no size of noise, and the twin's own outputs do.
+    #[test]
+    fn a_record_of_zeros_has_the_size_of_a_run() {
+        let u = Signal::from_shape_fn((60, 1), |(k, _)| [0.0, 1.0][k / 20 % 2]);
+        let drive = Drive::new(0.1, u).unwrap();
+        let records = [Record::new(drive, Signal::zeros((60, 1))).unwrap()];
+        let Twin::BlackBox(base) = Twin::new(AtOnce::<1>(|a, u| a[0] * u)) else {
+            unreachable!()
+        };
+        let (measured, _) = measured(&base, &records).unwrap();
+        let level = measured.parameters()[1].clone();
+        assert!((0.1..10.0).contains(&level.prior.high()), "{level:?}");
+    }
 
     /// A sensor's lag moves the mean and leaves the noise white; what rounds readings rounds the noise, which is then no longer known.
     #[test]

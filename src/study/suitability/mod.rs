@@ -71,6 +71,7 @@ impl Study {
             });
         }
         let mut findings = described(record, &self.twin.signals().outputs);
+        findings.extend(time::events(self, record));
         // A channel may have no value at the beginning; the whole record has one.
         let begin = record.first_part(record.samples().min(LIMITS.looked_at));
         let record = begin.unwrap_or_else(|| record.clone());

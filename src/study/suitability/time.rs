@@ -3,6 +3,7 @@
 use super::limits::LIMITS;
 use super::size::conversion;
 use super::{or_pass, text};
+use crate::fit::Warning;
 use crate::record::{Drive, Record, RecordError};
 use crate::study::Study;
 use crate::twin::conformance::Finding;
@@ -103,6 +104,15 @@ pub(super) fn check(
         }
     }
     (or_pass(findings, "time", &pass), 1.0)
+}
+
+/// Warns of events at times that the record has not.
+pub(super) fn events(study: &Study, record: &Record) -> Vec<Finding> {
+    let theta = study.twin.parameters().centre();
+    let outside = Warning::events_outside(&study.twin, &theta, std::slice::from_ref(record));
+    (outside.iter())
+        .map(|doubt| Finding::warning("time", format!("{}; {}", doubt.what, doubt.remedy)))
+        .collect()
 }
 
 /// The record with its times in seconds.

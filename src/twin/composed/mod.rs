@@ -34,12 +34,12 @@ pub(crate) use part::{
 };
 pub(crate) use simulation::{Acting, DeadTime, check_start, seconds_before};
 
-use crate::record::{Drive, Signal};
+use crate::record::{Drive, Record, Signal};
 use crate::twin::integrator::felt;
 use crate::twin::points::Layout;
 use crate::twin::{
-    Blocks, Hold, Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
-    Stepping, StepsTaken, Workspace,
+    Blocks, Event, Hold, Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError,
+    StateSpace, Stepping, StepsTaken, Workspace,
 };
 use own::OwnEquations;
 pub(in crate::twin) use parts::Parts;
@@ -197,6 +197,25 @@ impl Composed {
 
     pub(in crate::twin) fn parts(&self) -> &Parts {
         &self.parts
+    }
+
+    /// Returns the names of events whose times all lie outside these records, with the start of the twin.
+    pub(crate) fn events_outside(&self, theta: &[f64], records: &[Record]) -> Vec<&str> {
+        let spans = records.iter().filter_map(|record| {
+            let acting = Acting::of(self, theta, record.drive()).ok()?;
+            Some((acting, record.drive().own_time(record.samples() - 1)))
+        });
+        let spans: Vec<_> = spans.collect();
+        let is_outside = |event: &&Event| {
+            spans.iter().all(|(acting, end)| {
+                let start = acting.start();
+                let times = self.inside(&start, None, |own| event.times(own));
+                !times.is_empty() && times.iter().all(|at| *at < start.t || *at > *end)
+            })
+        };
+        let events = self.parts.outline.events.iter();
+        let events = events.filter(|_| !spans.is_empty());
+        events.filter(is_outside).map(Event::name).collect()
     }
 
     /// Returns whether it has events, so that each pass needs a memory of its own.

@@ -111,7 +111,7 @@ impl Event {
     }
 
     /// Returns its times; none of one of a condition.
-    pub(super) fn times(&self, now: &Now<'_>) -> Vec<f64> {
+    pub(in crate::twin) fn times(&self, now: &Now<'_>) -> Vec<f64> {
         match &self.trigger {
             Trigger::Margin(_) => vec![],
             Trigger::Times(times) => times(now),
