@@ -234,8 +234,9 @@ class Twin:
         ----------
         records : record or sequence of records
             A path of a CSV file, a DataFrame, or a dict of arrays, with the columns ``t`` and the names of inputs and outputs. nan
-            marks outputs that were not measured. Times are seconds, or datetimes, all with a zone or all without. A record without ``t``
-            has the twin's step. Messages call the first record ``record 1``, and count its rows from 0, as ``.iloc`` does.
+            marks outputs that were not measured. Times are seconds, or datetimes, all with a zone or all without. A record without ``t``,
+            and without columns that the twin has not, has the twin's step; beside ``t``, such columns are left out. Messages call the
+            first record ``record 1``, and count its rows from 0, as ``.iloc`` does.
         profile : bool, optional
             Profile likelihood of every parameter, as curves and on the page; otherwise of those alone that the prior shapes.
         columns : dict of str to str, optional
