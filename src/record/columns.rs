@@ -51,31 +51,19 @@ impl Columns {
         let mut keys = self.0.keys();
         keys.try_for_each(|key| channel_of(key, Some(signals)).map(drop))?;
         let header = self.header(signals);
-        let is_odd = |name: &&String| {
-            let same = header.iter().filter(|other| other == name).count();
-            same > 1 || name.trim().is_empty()
-        };
-        let is_outputs = |key: &String| {
-            usual_name(key, Some(signals)).is_some_and(|usual| usual.starts_with('y'))
-        };
-        let untold = (signals
-            .outputs
-            .iter()
-            .zip(&header[1 + signals.inputs.len()..]))
-        .find(|(output, column)| **column != output.name && !self.0.values().any(|c| c == *column));
-        if let Some((output, _)) = untold.filter(|_| self.0.keys().any(is_outputs)) {
-            return Err(format!(
-                "columns: \"{}\" has none, and its own name cannot be one; give it one, too",
-                quoted(&output.name)
-            ));
-        }
-        match header.iter().find(is_odd) {
-            Some(name) => Err(format!(
+        let cells: Vec<&str> = header.iter().map(String::as_str).collect();
+        let read = self.usual_names(&cells, Some(signals));
+        let read = read.map_err(|problem| format!("columns: {problem}"))?;
+        let usual = channels::columns(signals.inputs.len(), signals.outputs.len());
+        let mut all = cells.iter().zip(read.iter().zip(&usual));
+        let odd =
+            all.find(|(cell, (read, usual))| read.as_ref() != Some(*usual) || cell.is_empty());
+        odd.map_or(Ok(()), |(cell, _)| {
+            Err(format!(
                 "columns: \"{}\" is no column, or that of two channels; give each channel a column of its own",
-                quoted(name)
-            )),
-            None => Ok(()),
-        }
+                quoted(cell)
+            ))
+        })
     }
 
     /// Header of a file that is read with these columns as a record of a twin: other columns have names that its reader tells apart.
@@ -104,23 +92,19 @@ impl Columns {
 
     /// Returns whether a column is an output of the twin by its name alone, as each is that is not given beside others that are.
     fn is_by_name(&self, column: &str, signals: Option<&Signals>) -> bool {
-        let Some(signals) = signals.filter(|signals| signals.outputs.len() > 1) else {
+        let (Some(signals), Some(usual)) = (signals, usual_name(column, signals)) else {
             return false;
         };
-        let Some(usual) = usual_name(column, Some(signals)) else {
-            return false;
-        };
-        let given = || {
-            self.0
-                .keys()
-                .filter_map(|key| usual_name(key, Some(signals)))
-        };
+        let keys = self.0.keys();
+        let given: Vec<String> = keys
+            .filter_map(|key| usual_name(key, Some(signals)))
+            .collect();
         // As cells of a header are.
         let is_cell = column.trim() == column && !column.contains(['\r', '\n']);
         is_cell
             && signals.outputs.iter().any(|output| output.name == column)
-            && given().any(|given| given.starts_with('y'))
-            && !given().any(|given| given == usual)
+            && given.iter().any(|given| given.starts_with('y'))
+            && !given.contains(&usual)
     }
 
     /// The same without those of outputs, for files of time and inputs.
