@@ -372,3 +372,52 @@ def test_progress_ends_where_the_error_begins():
     shown = b"\r\x1b[2K   simulating 3/9\r\x1b[2Kerror: wrong\r\n"
     found = _process._ERROR.search(shown)
     assert shown[: found.end() - 7].endswith(b"3/9\r\x1b[2K")
+
+
+def test_results_and_options_are_refused_in_words_of_arguments(twin, record, tmp_path):
+    fit = twin.fit(record)
+    for path in (1, True, "", tmp_path, tmp_path / "missing" / "page.html"):
+        with pytest.raises((TypeError, ValueError, truetwin.TruetwinError), match="give (a|the) ") as caught:
+            fit.report.save(path)
+        assert "\n" not in str(caught.value)
+    for call, part in [
+        (lambda: twin.fit(record, out=tmp_path), "choose another out"),
+        (lambda: twin.fit(record, out=""), "out = ''; give the path"),
+        (lambda: twin.fit(record, out=5), "out of type int; give a path"),
+        (lambda: twin.withheld(None), "trials = None; give a whole number"),
+        (lambda: twin.withheld(10**9), "trials = 1000000000: choose at most"),
+        (lambda: twin.withheld(1, columns={"t": "time"}), "columns are those of the record `like`"),
+        (lambda: twin.withheld(1, kinds="odd"), "odd"),
+        (lambda: twin.check(columns={"t": "time"}), "columns are those of a record"),
+        (lambda: twin.diagnose(record, calibrate=10**30), "calibrate = .*smaller whole number"),
+        (lambda: twin.diagnose(record, without="sensor-biass"), r"effects\(\) lists them"),
+        (lambda: twin.diagnose(record, without=""), "without: an empty text"),
+        (lambda: truetwin.Twin(heater, **SETTING, timeout=1e300).fit(record), "timeout = 1e300"),
+    ]:
+        with pytest.raises((TypeError, ValueError, truetwin.TruetwinError), match=part) as caught:
+            call()
+        assert not re.search(r"--\w|study", str(caught.value)), caught.value
+    assert "sensor-bias@sensor" in twin.effects()
+
+    def late(parameters, inputs, time):
+        raise truetwin.Diverged(1e6)
+
+    with pytest.raises(truetwin.TruetwinError, match=r"Diverged\(1e\+06\): give a time of this run, which ends at"):
+        truetwin.Twin(late, **SETTING).fit(record)
+
+
+def test_a_simulator_that_follows_nothing_is_no_all_clear(tmp_path):
+    """A jump of the sensor as large as the signal: the noise of a callable may take it, and the answer says so."""
+    def decay(parameters, inputs, time):
+        return np.exp(-parameters["rate"] * time)
+
+    twin = truetwin.Twin(decay, parameters={"rate": (0.1, 2.0)}, outputs="y", step=0.1, samples=60, noise=0.02)
+    record = twin.simulate({"rate": 0.5})
+    jump = {**record, "y": record["y"] + 0.8 * (record["t"] > 3.0)}
+    found = twin.diagnose(jump, quick=True)
+    assert found.verdict == "structural-gap" or any("no better than a constant" in warning for warning in found.warnings), found
+    # Of another noise than the declared one, errors that simulations tell are too small; the estimate says so.
+    estimator = twin.pretrain(tmp_path / "decay.est", bank_size=300, epochs=20)
+    loud = {**record, "y": record["y"] + 0.1 * np.random.default_rng(1).standard_normal(60)}
+    told = [any("the simulator's own noise" in warning for warning in twin.estimate(given, estimator).warnings) for given in (record, loud)]
+    assert told == [False, True]

@@ -30,7 +30,7 @@ use crate::likelihood::start_elsewhere;
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
-use crate::twin::Stepping;
+use crate::twin::{Stepping, Twin};
 
 /// A search and what its report is to hold.
 pub(super) struct Report<'d> {
@@ -77,7 +77,7 @@ impl Report<'_> {
             verdict: answer.verdict,
             detection,
             check,
-            warnings: self.warnings(records, &parameters),
+            warnings: self.warnings(records, &parameters, answer.verdict),
             residuals: (records.iter().zip(filtered.into_iter().flatten()))
                 .filter_map(|(record, filtered)| {
                     Record::new(record.drive().clone(), filtered.standardised).ok()
@@ -140,7 +140,12 @@ impl Report<'_> {
     }
 
     /// Lists what makes the diagnosis doubtful.
-    fn warnings(&self, records: &[Record], parameters: &[FittedParameter]) -> Vec<Warning> {
+    fn warnings(
+        &self,
+        records: &[Record],
+        parameters: &[FittedParameter],
+        verdict: Verdict,
+    ) -> Vec<Warning> {
         let twin = self.study.twin();
         let beliefs = self.watch.settings.beliefs(self.study);
         let elsewhere = start_elsewhere(twin, records, &beliefs);
@@ -154,6 +159,21 @@ impl Report<'_> {
         );
         all.extend(elsewhere.map(|start| Warning::elsewhere(&start, records.len())));
         all.extend((self.other_hold()).map(|stepping| Warning::hold(stepping, None)));
+        if let (Twin::BlackBox(_), Verdict::NoGap) = (twin, verdict) {
+            // No check at all horizons looks at it: noise may have taken what it does not follow.
+            let base = &self.found.evidence.base;
+            let run = |record: &Record| base.model.base.free_run(&base.theta, record.drive());
+            let outputs = &twin.signals().outputs;
+            let told = records.iter().filter_map(|record| {
+                Some(Warning::no_better_of(outputs, record, &run(record).ok()?))
+            });
+            let noise = "noise may hide what is missing: take a longer record, or a quieter sensor";
+            all.extend(told.flatten().map(|doubt| Warning {
+                remedy: noise,
+                ..doubt
+            }));
+            all.dedup();
+        }
         all
     }
 

@@ -6,7 +6,7 @@ use super::problem::Problem;
 use super::searched::WithoutEffects;
 use crate::effect::Magnitude;
 use crate::likelihood::{StartElsewhere, rounded};
-use crate::math::{is_constant, three_digits};
+use crate::math::{deviation, is_constant, norm, three_digits};
 use crate::record::{Quantity, Record, Signal, Signals};
 use crate::setting::{number, unit_suffix};
 use crate::twin::conformance::{StepLength, step_length};
@@ -134,6 +134,16 @@ impl Warning {
         )
     }
 
+    /// Outputs of which record − run is as large as the record's own variation.
+    pub(crate) fn no_better_of(outputs: &[Quantity], record: &Record, run: &Signal) -> Vec<Self> {
+        let is_no_better = |j: &usize| {
+            let (values, errors) = beside(record, run, *j);
+            norm(&errors) >= deviation(&values) * (values.len() as f64).sqrt()
+        };
+        let all = (0..outputs.len()).filter(is_no_better);
+        all.map(|j| Self::no_better(&outputs[j].name)).collect()
+    }
+
     /// A step that moves outputs by more than their noise; `of` names the record.
     pub(crate) fn step(twin: &Twin, theta: &[f64], record: &Record, of: &str) -> Option<Self> {
         let StepLength::Coarse(fault) = step_length(twin, theta, record.drive())? else {
@@ -235,6 +245,13 @@ impl Warning {
         ]
         .concat()
     }
+}
+
+/// Values of an output that a record has, and what a run leaves of them.
+pub(crate) fn beside(record: &Record, run: &Signal, output: usize) -> (Vec<f64>, Vec<f64>) {
+    let pairs = (record.outputs().column(output).into_iter()).zip(run.column(output));
+    let present = pairs.filter(|(y, _)| y.is_finite());
+    present.map(|(y, run)| (*y, y - run)).unzip()
 }
 
 /// Warnings of a fit.

@@ -103,7 +103,7 @@ def _sympy(what: str, value: Any) -> str:
         relation = next((sign for name, sign in _RELATIONS.items() if isinstance(e, getattr(sympy, name))), None)
         if relation:
             return f"({arguments[0]} {relation} {arguments[1]})"
-        if e.is_Function and not e.args[1:] and str(e.args[0]) == "t" and type(e).__name__ not in _NAMES:
+        if e.is_Function and len(e.args) == 1 and str(e.args[0]) == "t" and type(e).__name__ not in _NAMES:
             # q(t), as dynamics are often written.
             return type(e).__name__
         name = _NAMES.get(type(e).__name__)

@@ -6,6 +6,9 @@ import html
 import os
 from dataclasses import dataclass
 
+from ._errors import TruetwinError
+from ._names import word
+
 
 @dataclass(frozen=True, repr=False)
 class Report:
@@ -39,9 +42,13 @@ class Report:
         path : path
             File to write; an existing one is replaced.
         """
+        name = word(path)
         body = f'<!doctype html><meta charset="utf-8"><title>truetwin</title>{self._body()}'
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(self.page or body)
+        try:
+            with open(name, "w", encoding="utf-8") as file:
+                file.write(self.page or body)
+        except OSError as error:
+            raise TruetwinError(f"{name}: {error.strerror}; give a file that can be written") from error
 
     def _repr_html_(self) -> str:
         if self.page is None:

@@ -107,7 +107,12 @@ class Model:
             outputs = ",".join(f"{json.dumps(key)}:[{_numbers(column)}]" for key, column in self._columns(result, samples))
             answer = f'"outputs":{{{outputs}}}'
         except Diverged as error:
-            answer = f'"diverged":{max(error.time - start, 0.0)!r}'
+            end = start + (samples - 1) * step
+            if error.time <= end:
+                answer = f'"diverged":{max(error.time - start, 0.0)!r}'
+            else:
+                late = f"Diverged({error.time:.6g}): give a time of this run, which ends at {end:.6g} s"
+                answer = f'"error":{json.dumps(late)}'
         except (OverflowError, FloatingPointError):
             # Arithmetic beyond the finite numbers, which arrays show as inf: at these parameters, not in the code.
             answer = '"diverged":0'
@@ -251,7 +256,9 @@ def planned(levels: Levels, hold: int) -> dict[str, Any]:
         elif isinstance(plan, Mapping):
             if unknown := set(plan) - {"levels", "hold"}:
                 raise ValueError(f"levels: {name} has no {sorted(unknown)[0]}; give levels and hold")
-            plans[name] = _staircase(f"levels: {name}", plan.get("levels"), whole(f"levels: {name}, hold", plan.get("hold", hold)))
+            if "levels" not in plan:
+                raise ValueError(f"levels: {name} has no levels; give {{'levels': (low, high), 'hold': n}}")
+            plans[name] = _staircase(f"levels: {name}", plan["levels"], whole(f"levels: {name}, hold", plan.get("hold", hold)))
         elif np.ndim(plan) == 0 and not isinstance(plan, bool):
             remedy = "give (low, high), a number, or the path of a file"
             plans[name] = number(f"levels: {name}", plan, remedy)

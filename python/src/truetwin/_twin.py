@@ -14,7 +14,7 @@ from . import _process, _records
 from ._equations import Entry, Expression, Text, is_expression
 from ._errors import TruetwinError
 from ._names import Names, word
-from ._numbers import Array, count, flag, mapping, named, number, one_line, whole
+from ._numbers import Array, count, flag, mapping, named, number, one_line, shown, whole
 from ._points import Equation, PointModel, States
 from ._records import Record, Records
 from ._report import Report
@@ -303,7 +303,9 @@ class Twin:
             options += _flags(quick=quick, step_of_record=step_of_record)
             if validation is not None:
                 options += ["--validation", call.record("validation", validation, columns)]
-            excluded = [without] if isinstance(without, str) else _texts("without", without or ())
+            excluded = [without] if isinstance(without, str) else _texts("without", () if without is None else without)
+            if not all(effect.strip() for effect in excluded):
+                raise ValueError("without: an empty text; give an effect, as effects() lists them")
             if isinstance(self._model, Model) and not self._model.takes_seed and self._study is None:
                 # The noise level of such a twin is fitted in every hypothesis. As an effect it would count twice, and be a gap.
                 excluded.append("sensor-noise")
@@ -453,6 +455,8 @@ class Twin:
         Check
         """
         with _Call(self) as call:
+            if record is None and columns:
+                raise ValueError("columns are those of a record; give it, too")
             files = [] if record is None else [call.record("record", record, columns), *call.columns(columns)]
             # A failed check is an answer with exit code 1.
             raw = json.loads(call.run("check", [*files, *call.subject(noise=True), "--json"], seed, answers=(0, 1)))
@@ -460,12 +464,24 @@ class Twin:
                 finding["message"] = call.names.finding("record", finding["message"])
             return Check._of(raw)
 
+    def effects(self) -> list[str]:
+        """Return the effects that may be added to this twin, as ``"sensor-bias@sensor"``: those that `diagnose` looks for, and `without` leaves out.
+
+        Returns
+        -------
+        list of str
+        """
+        with _Call(self) as call:
+            listed = json.loads(call.run("effects", [*call.subject(), "--json"]))["effects"]
+            return [f"{effect['id']}@{target}" for effect in listed for target in effect["targets"]]
+
     def withheld(
         self,
         trials: int,
         *,
         detection_only: bool = False,
         validation: bool = False,
+        kinds: str | Sequence[str] | None = None,
         like: Record | None = None,
         columns: Mapping[str, str] | None = None,
         seed: int = 1,
@@ -481,6 +497,8 @@ class Twin:
             Stop each diagnosis at its verdict.
         validation : bool, optional
             Give each diagnosis a validation record.
+        kinds : str or sequence of str, optional
+            Kinds of truth, as ``truetwin withheld --help`` lists them. The default is all that the program has for this twin.
         like : record, optional
             Measured record whose inputs, length, step and gaps the trials have. The default is the twin's plan.
         columns, seed
@@ -493,8 +511,12 @@ class Twin:
         Scorecard
         """
         with _Call(self) as call:
-            options = [*call.subject(noise=True), *_option("--trials", trials, 1)]
+            options = [*call.subject(noise=True), "--trials", str(count("trials", trials, 1))]
+            if kinds is not None:
+                options.append(f"--kinds={','.join([kinds] if isinstance(kinds, str) else _texts('kinds', kinds))}")
             options += _flags(detection_only=detection_only, validation=validation)
+            if like is None and columns:
+                raise ValueError("columns are those of the record `like`; give it, too")
             if like is not None:
                 options += ["--like", call.record("like", like, columns), *call.columns(columns)]
             folder, text = call.folder("withheld", options, seed, out)
@@ -566,7 +588,7 @@ class _Call:
             return ["--study", str(study)]
         return []
 
-    def run(self, verb: str, options: Sequence[str], seed: int, *, answers: Sequence[int] = (0,)) -> str:
+    def run(self, verb: str, options: Sequence[str], seed: int = 1, *, answers: Sequence[int] = (0,)) -> str:
         """Run a verb and return what it prints."""
         words = [verb, *options, "--seed", str(count("seed", seed, 0, LARGEST_SEED)), *_option("--threads", self._twin._threads, 1)]
         environment = {}
@@ -593,8 +615,8 @@ class _Call:
 
     def folder(self, verb: str, options: Sequence[str], seed: int, out: Path_ | None) -> tuple[Path, str]:
         """Run a verb that fills a folder; return the folder and what it prints."""
-        folder = self.path / "result" if out is None else Path(out)
-        return folder, self.run(verb, [*options, "--out", word(folder, "out")], seed)
+        folder = self.path / "result" if out is None else Path(word(out, "out"))
+        return folder, self.run(verb, [*options, "--out", word(folder)], seed)
 
 
 def _flags(**given: bool) -> list[str]:
@@ -606,7 +628,7 @@ def _texts(what: str, value: Any) -> list[str]:
     """Return a list of texts; refuse anything else."""
     texts = value if isinstance(value, Sequence) else None
     if texts is None or not all(isinstance(text, str) for text in texts):
-        raise TypeError(f"{what} = {value!r}; give a text or a list of texts")
+        raise TypeError(f"{what} = {shown(value)}; give a text or a list of texts")
     return list(texts)
 
 

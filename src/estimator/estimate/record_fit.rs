@@ -53,7 +53,12 @@ impl RecordFit {
             false => with_levels(study.twin(), record, &study.beliefs(), draws)
                 .map_err(|error| EstimatorError::from(StudyError::Adaptation(error))),
         };
-        let levels: Vec<FittedNoise> = fit.noise.iter().filter(|l| is_off(l)).cloned().collect();
+        let levels: Vec<FittedNoise> = fit
+            .noise
+            .iter()
+            .filter(|level| is_declared_off(level))
+            .cloned()
+            .collect();
         let off = levels.iter().map(|level| (level.name.clone(), level.value));
         // A fitted level where none is declared may be no more than a floor, and hides what an exact twin would show.
         let is_declared = |level: &&FittedNoise| level.declared.is_some() && level.value > 0.0;
@@ -77,10 +82,14 @@ impl RecordFit {
 }
 
 /// Returns whether a level is surely another than the declared one.
-fn is_off(level: &FittedNoise) -> bool {
-    level.declared.is_some_and(|declared| {
-        let distance = (level.value / declared).ln().abs();
-        distance > BUDGET.level_factor.ln()
-            && distance > BUDGET.level_off * level.std_error / level.value
-    })
+fn is_declared_off(level: &FittedNoise) -> bool {
+    level
+        .declared
+        .is_some_and(|declared| is_off(level.value / declared, level.std_error / level.value))
+}
+
+/// Returns whether a ratio of levels is surely none of 1; `error` is the relative one.
+pub(super) fn is_off(ratio: f64, error: f64) -> bool {
+    let distance = ratio.ln().abs();
+    distance > BUDGET.level_factor.ln() && distance > BUDGET.level_off * error
 }

@@ -1,14 +1,15 @@
 //! Reasons to doubt an estimate.
 
 use super::outcome::Estimate;
+use super::record_fit::is_off;
 use crate::estimator::budget::BUDGET;
 use crate::estimator::gate::GateOutcome;
-use crate::fit::doubts::DIVERGES;
+use crate::fit::doubts::{DIVERGES, beside};
 use crate::fit::{Fit, NOT_CONVERGED, Warning};
-use crate::math::{deviation, three_digits};
-use crate::record::{Record, Signal};
+use crate::math::{norm, three_digits};
+use crate::record::{Quantity, Record, Signal};
 use crate::setting::number;
-use crate::twin::{PRIOR_DEVIATION, Role, Twin};
+use crate::twin::{Noise, PRIOR_DEVIATION, Role, Twin};
 
 /// Lists what makes an estimate doubtful; `fit` is the likelihood's own, where there is one.
 pub(super) fn warnings(
@@ -20,11 +21,14 @@ pub(super) fn warnings(
     let signals = twin.signals();
     let mut all = Warning::still(&signals, std::slice::from_ref(record));
     match &estimate.tracking {
-        Some(run) => all.extend(
-            (signals.outputs.iter().enumerate())
-                .filter(|(j, _)| no_better_than_constant(record, &run.outputs, *j))
-                .map(|(_, output)| Warning::no_better(&output.name)),
-        ),
+        Some(run) => {
+            all.extend(Warning::no_better_of(
+                &signals.outputs,
+                record,
+                &run.outputs,
+            ));
+            all.extend(noise_of_black_box(twin, record, estimate, &run.outputs));
+        }
         None => all.push(Warning::new(
             DIVERGES,
             "the free run at the estimate diverges".to_owned(),
@@ -90,13 +94,38 @@ pub(super) fn warnings(
     all
 }
 
-/// Returns whether record − run is as large as the record's own variation.
-fn no_better_than_constant(record: &Record, run: &Signal, output: usize) -> bool {
-    let pairs: Vec<(f64, f64)> = (record.outputs().column(output).iter().copied())
-        .zip(run.column(output).iter().copied())
-        .filter(|(y, _)| y.is_finite())
-        .collect();
-    let values: Vec<f64> = pairs.iter().map(|(y, _)| *y).collect();
-    let squares: f64 = pairs.iter().map(|(y, f)| (y - f).powi(2)).sum();
-    (squares / values.len().max(1) as f64).sqrt() >= deviation(&values)
+/// Noise of outputs of a black box, which is simulated as it is: of a record that surely has another one, errors and tests say too little.
+fn noise_of_black_box(
+    twin: &Twin,
+    record: &Record,
+    estimate: &Estimate,
+    run: &Signal,
+) -> Vec<Warning> {
+    let noise = Noise::new(0, "declared noise", 0);
+    let noisy = twin.simulate(&estimate.theta, record.drive(), noise);
+    let (Twin::BlackBox(_), Ok(noisy)) = (twin, noisy) else {
+        return vec![];
+    };
+    let told = |(j, output): (usize, &Quantity)| {
+        let (values, shown) = beside(record, run, j);
+        let own: Vec<f64> = (noisy.column(j).iter().zip(run.column(j)))
+            .map(|(noisy, run)| noisy - run)
+            .collect();
+        let samples = values.len() as f64;
+        let shown = norm(&shown) / samples.sqrt();
+        let own = norm(&own) / (own.len() as f64).sqrt();
+        let is_off = own > 0.0 && is_off(shown / own, samples.sqrt().recip());
+        is_off.then(|| {
+            let what = format!(
+                "record and run differ by {} {} in {}, the simulator's own noise by {}, which errors and tests are told from",
+                number(three_digits(shown)),
+                output.unit,
+                output.name,
+                number(three_digits(own)),
+            );
+            Warning::new("noise-not-declared", what)
+        })
+    };
+    let outputs = twin.signals().outputs;
+    outputs.iter().enumerate().filter_map(told).collect()
 }
