@@ -143,12 +143,14 @@ pub enum FeatureError {
     },
     /// An output that never changes.
     #[error(
-        "output {channel} is constant ({}); nothing can be estimated from it: check the sensor, or drive the system",
+        "{name} is constant ({}); nothing can be estimated from it: check the sensor, or drive the system",
         number(*value)
     )]
     Constant {
         /// Channel, from 1.
         channel: usize,
+        /// Its name, or its number where the twin is not known.
+        name: String,
         /// Its value.
         value: f64,
     },
@@ -187,7 +189,12 @@ fn check_varies(outputs: &Signal) -> Result<(), FeatureError> {
     for (column, channel) in outputs.columns().into_iter().zip(1..) {
         let value = column[0];
         if column.iter().all(|v| *v == value) {
-            return Err(FeatureError::Constant { channel, value });
+            let name = format!("output {channel}");
+            return Err(FeatureError::Constant {
+                channel,
+                name,
+                value,
+            });
         }
     }
     Ok(())

@@ -70,8 +70,11 @@ impl FeatureSimulator {
     /// Features of a record.
     pub fn observe(&self, record: &Record) -> Result<DVector<f64>, FeatureError> {
         record.check_complete()?;
-        let features = self.map.extract(record.drive(), record.outputs())?;
-        Ok(DVector::from_vec(features))
+        let mut features = self.map.extract(record.drive(), record.outputs());
+        if let Err(FeatureError::Constant { channel, name, .. }) = &mut features {
+            *name = self.twin.signals().outputs[*channel - 1].name.clone();
+        }
+        Ok(DVector::from_vec(features?))
     }
 
     /// The simulator with its features about θ; `None` for features that have no reference. Calls are counted together.
