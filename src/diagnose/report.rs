@@ -30,7 +30,7 @@ use crate::likelihood::start_elsewhere;
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
-use crate::twin::{Stepping, Twin};
+use crate::twin::Stepping;
 
 /// A search and what its report is to hold.
 pub(super) struct Report<'d> {
@@ -159,7 +159,7 @@ impl Report<'_> {
         );
         all.extend(elsewhere.map(|start| Warning::elsewhere(&start, records.len())));
         all.extend((self.other_hold()).map(|stepping| Warning::hold(stepping, None)));
-        if let (Twin::BlackBox(_), Verdict::NoGap) = (twin, verdict) {
+        if twin.outline().is_none() && verdict == Verdict::NoGap {
             // No check at all horizons looks at it: noise may have taken what it does not follow.
             let base = &self.found.evidence.base;
             let run = |record: &Record| base.model.base.free_run(&base.theta, record.drive());

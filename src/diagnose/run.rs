@@ -79,7 +79,10 @@ fn whole(
     }
     let log_z = |found: &Search<Setup<'_>>| Some(found.known.listed_log_z());
     let (found, is_held) = match held {
-        Some(held) => with_better_start(found, log_z, || Ok::<_, StudyError>(held))?,
+        Some(held) => {
+            let found = (found, study.bends_readings());
+            with_better_start(found, log_z, || Ok::<_, StudyError>(held))?
+        }
         None => (found, false),
     };
     let study = if is_held { &trusting } else { study };
@@ -135,7 +138,7 @@ fn reported(
     report(study, &found, validation, Watch { settings, progress }).diagnosis(detection)
 }
 
-/// Returns whether a first row is not what the twin's code says, and something is missing.
+/// Returns whether a first row is not what the twin's code says, and something is missing, or the study has effects that may bend it.
 fn contradicts_start(
     study: &Study,
     found: &Search<Setup<'_>>,
@@ -144,7 +147,8 @@ fn contradicts_start(
 ) -> bool {
     let is_explained = found.known.log_z() - found.known.twin().log_z <= THRESHOLDS.gap;
     let elsewhere = || start_elsewhere(study.twin(), records, &settings.beliefs(study));
-    !found.is_partial && !is_explained && elsewhere().is_some_and(|start| !start.is_held)
+    let may_stand = !is_explained || study.bends_readings();
+    !found.is_partial && may_stand && elsewhere().is_some_and(|start| !start.is_held)
 }
 
 impl Study {

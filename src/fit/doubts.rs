@@ -157,16 +157,9 @@ impl Warning {
 
     /// Events of a twin at times that no record has.
     pub(crate) fn events_outside(twin: &Twin, theta: &[f64], records: &[Record]) -> Vec<Self> {
-        let twin = twin.equations().into_iter();
-        let names = twin.flat_map(|twin| twin.events_outside(theta, records));
-        names
-            .map(|name| {
-                Self::new(
-                    "event-outside",
-                    format!("{name} never acts: these lie outside the records"),
-                )
-            })
-            .collect()
+        let names = twin.events_outside(theta, records).into_iter();
+        let told = names.map(|name| format!("{name} never acts: these lie outside the records"));
+        told.map(|what| Self::new("event-outside", what)).collect()
     }
 
     /// Times of record `r` of so many that are in another unit than seconds, by what shows it.
@@ -285,11 +278,18 @@ impl<'a> Doubts<'a> {
         );
     }
 
-    /// Warns of a start that is not that of the records.
-    pub fn start(&mut self, start: Option<&StartElsewhere>) {
+    /// Warns of a start that is not that of the records, unless it stands and fitted effects explain the first row, as residuals in
+    /// their deviations show.
+    pub fn start(&mut self, start: Option<&StartElsewhere>, residuals: &[Signal]) {
         let records = self.problem.records.len();
+        let outputs = self.problem.twin.signals().outputs;
+        let is_explained = |start: &&StartElsewhere| {
+            let output = outputs.iter().position(|output| *output == start.output);
+            output.is_some_and(|j| StartElsewhere::is_explained_at(residuals[start.record][[0, j]]))
+        };
+        let told = start.filter(|start| !(start.is_held && is_explained(start)));
         self.all
-            .extend(start.map(|start| Warning::elsewhere(start, records)));
+            .extend(told.map(|start| Warning::elsewhere(start, records)));
     }
 
     /// Warns of a search that has not arrived, [`by_step`](Self::steps) or for want of what a record tells.

@@ -100,7 +100,7 @@ pub(crate) fn run(
     let by_step = doubts.steps(&free_runs);
     doubts.below(alone.filter(|_| !ends), fitted.log_likelihood);
     doubts.search(&convergence, by_step);
-    doubts.start(measured.elsewhere.as_ref());
+    doubts.start(measured.elsewhere.as_ref(), &residuals);
     doubts.bounds(&parameters, &noise_levels, (without.as_ref(), gained));
     doubts.runs(&errors, by_step);
     doubts.swallowed(stages.of(None, || swallowed(&problem, &fitted, levels, &errors))?);

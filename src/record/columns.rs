@@ -52,18 +52,24 @@ impl Columns {
         keys.try_for_each(|key| channel_of(key, Some(signals)).map(drop))?;
         let header = self.header(signals);
         let cells: Vec<&str> = header.iter().map(String::as_str).collect();
-        let read = self.usual_names(&cells, Some(signals));
-        let read = read.map_err(|problem| format!("columns: {problem}"))?;
+        let twice = |at: usize| cells[..at].contains(&cells[at]) || cells[at].is_empty();
+        let read = match (0..cells.len()).any(twice) {
+            true => vec![],
+            false => (self.usual_names(&cells, Some(signals)))
+                .map_err(|problem| format!("columns: {problem}"))?,
+        };
         let usual = channels::columns(signals.inputs.len(), signals.outputs.len());
-        let mut all = cells.iter().zip(read.iter().zip(&usual));
-        let odd =
-            all.find(|(cell, (read, usual))| read.as_ref() != Some(*usual) || cell.is_empty());
-        odd.map_or(Ok(()), |(cell, _)| {
-            Err(format!(
+        let is_read = |at: usize| {
+            read.get(at)
+                .is_some_and(|name| name.as_ref() == usual.get(at))
+        };
+        match (0..cells.len()).find(|&at| twice(at) || !(read.is_empty() || is_read(at))) {
+            None => Ok(()),
+            Some(at) => Err(format!(
                 "columns: \"{}\" is no column, or that of two channels; give each channel a column of its own",
-                quoted(cell)
-            ))
-        })
+                quoted(cells[at])
+            )),
+        }
     }
 
     /// Header of a file that is read with these columns as a record of a twin: other columns have names that its reader tells apart.

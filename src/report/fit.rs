@@ -93,7 +93,8 @@ pub(super) fn fit_document(study: &Study, records: &[Record], fit: &Fit) -> Docu
     ];
     if !fit.profiles.is_empty() {
         let block = Block::picture(profiles_svg(study, fit), PROFILES);
-        sections.push(Section::new("profiles", "Profile likelihoods", vec![block]));
+        let section = Section::new("profiles", "Profile likelihoods", vec![block]);
+        sections.push(section.brief(intervals(fit)));
     }
     sections.extend(fit.posterior.as_ref().map(|p| draws(study, p)));
     let others: Vec<Block> = pictures
@@ -127,6 +128,36 @@ pub(super) fn fit_document(study: &Study, records: &[Record], fit: &Fit) -> Docu
         sections,
         ..Document::default()
     }
+}
+
+/// Intervals of the profiles that the table of parameters has not.
+fn intervals(fit: &Fit) -> Vec<Block> {
+    let is_told = |name: &str| {
+        fit.parameters
+            .iter()
+            .any(|p| p.by_profile && p.name == name)
+    };
+    let end = |end: Option<f64>| end.map_or("open".into(), short);
+    let told = fit
+        .profiles
+        .iter()
+        .filter(|profile| !is_told(&profile.name));
+    let told: Vec<String> = told
+        .map(|p| {
+            format!(
+                "{} [{}, {}]{}",
+                p.name,
+                end(p.low),
+                end(p.high),
+                unit_suffix(&p.unit)
+            )
+        })
+        .collect();
+    let text = format!("Profile, {:.0} %: {}.", 100.0 * fit.level, told.join("; "));
+    (!told.is_empty())
+        .then(|| Block::paragraph(text))
+        .into_iter()
+        .collect()
 }
 
 /// Caption of profiles.

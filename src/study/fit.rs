@@ -14,7 +14,7 @@ use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
 use crate::twin::conformance::blamed_step;
-use crate::twin::{Noise, NoiseLevel, StartLevel, Stepping, Twin};
+use crate::twin::{Noise, NoiseLevel, Role, StartLevel, Stepping, Twin};
 use std::time::Instant;
 
 impl Study {
@@ -92,7 +92,7 @@ impl Study {
             let again =
                 || (trusting.fit_once(asks, records, settings, &passes)).map(|(fit, _)| fit);
             let log_z = |fit: &Fit| Some(fit.evidence.as_ref()?.log_evidence);
-            (fit, _) = with_better_start(fit, log_z, again)?;
+            (fit, _) = with_better_start((fit, self.bends_readings()), log_z, again)?;
         }
         fit.seconds = clock.elapsed().as_secs_f64();
         if !fit.interrupted {
@@ -197,6 +197,12 @@ impl Study {
             .iter()
             .map(|entry| self.catalogue.resolve(entry));
         Ok(effects.collect::<Result<_, _>>()?)
+    }
+
+    /// Returns whether effects of the study are fitted, which may bend what a start shows.
+    pub(crate) fn bends_readings(&self) -> bool {
+        let space = self.twin.parameters();
+        space.iter().any(|p| p.role == Role::Magnitude)
     }
 
     /// The study's word on noise levels and starts, for likelihoods of measured records.

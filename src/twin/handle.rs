@@ -2,7 +2,7 @@
 
 use super::composed::{Entry, FREE_RUNS, Parts, check_start};
 use super::definitions::defined_states;
-use crate::record::{Drive, RecordError, Signal, Signals};
+use crate::record::{Drive, Record, RecordError, Signal, Signals};
 use crate::twin::{
     Composed, ComposedBlackBox, DigitalTwin, Hold, Integrator, KnownNoise, Noise, Now, Outline,
     Parameter, ParameterSpace, SimulationError, Stepping, StepsTaken, TwinError, TwinPart,
@@ -190,6 +190,11 @@ impl Twin {
     /// Returns the time that its start belongs to; `None` for the first row of a record.
     pub(crate) fn begins(&self) -> Option<f64> {
         self.equations()?.begins()
+    }
+
+    /// Returns the names of events whose times all lie outside these records; none of a black box.
+    pub(crate) fn events_outside(&self, theta: &[f64], records: &[Record]) -> Vec<&str> {
+        (self.equations()).map_or_else(Vec::new, |twin| twin.events_outside(theta, records))
     }
 
     /// Returns the adaptive substeps of a run without noise at θ; `None` for fixed steps, a run that diverges, and a black box.

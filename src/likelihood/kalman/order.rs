@@ -45,13 +45,13 @@ enum Values<'k> {
 /// A row at a sample, or at a step before the first: its punctual outputs, or a value of a late one.
 #[derive(Clone, Copy)]
 struct TimedRow {
-    place: Place,
+    place: ShownState,
     late: Option<LateReading>,
 }
 
-/// What a row shows.
+/// The state that a row shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Place {
+pub(super) enum ShownState {
     /// The state where this step from the start to the first row begins.
     Before(usize),
     Sample(usize),
@@ -104,7 +104,7 @@ impl<'k> Order<'k> {
         let (mut rows, mut dead_time) = (vec![], vec![0; kalman.channels]);
         for (sample, time) in times.iter().enumerate() {
             rows.push(TimedRow {
-                place: Place::Sample(sample),
+                place: ShownState::Sample(sample),
                 late: None,
             });
             for (output, delay) in delays.iter().enumerate().filter(|(_, d)| **d > 0.0) {
@@ -112,13 +112,13 @@ impl<'k> Order<'k> {
                 dead_time[output] = dead_time[output].max(sample - shown).max(1);
                 let step = ahead.partition_point(|ahead| *ahead > delay - time);
                 let (place, after) = match (shown, step) {
-                    (1.., _) => (Place::Sample(shown), time - times[shown]),
+                    (1.., _) => (ShownState::Sample(shown), time - times[shown]),
                     // Before the start, its value stands.
-                    (0, 0) if ahead.is_empty() => (Place::Sample(0), f64::INFINITY),
-                    (0, 0) => (Place::Before(0), f64::INFINITY),
+                    (0, 0) if ahead.is_empty() => (ShownState::Sample(0), f64::INFINITY),
+                    (0, 0) => (ShownState::Before(0), f64::INFINITY),
                     (0, step) => match ahead.get(step) {
-                        Some(ahead) => (Place::Before(step), time + ahead),
-                        None => (Place::Sample(0), *time),
+                        Some(ahead) => (ShownState::Before(step), time + ahead),
+                        None => (ShownState::Sample(0), *time),
                     },
                 };
                 let late = LateReading {
@@ -204,14 +204,14 @@ impl<'k> Order<'k> {
         &self.values()[i * self.channels..(i + 1) * self.channels]
     }
 
-    /// What row i shows.
+    /// The state that row i shows.
     #[inline(always)]
-    pub fn place(&self, i: usize) -> Place {
+    pub fn place(&self, i: usize) -> ShownState {
         match &self.by_time {
             None => match i.checked_sub(self.before) {
-                Some(k) => Place::Sample(k),
-                None if self.steps_before == 0 => Place::Sample(0),
-                None => Place::Before((self.steps_before + i).saturating_sub(self.before)),
+                Some(k) => ShownState::Sample(k),
+                None if self.steps_before == 0 => ShownState::Sample(0),
+                None => ShownState::Before((self.steps_before + i).saturating_sub(self.before)),
             },
             Some(rows) => rows[i].place,
         }
@@ -221,8 +221,8 @@ impl<'k> Order<'k> {
     #[inline(always)]
     pub fn state_of(&self, i: usize) -> usize {
         match self.place(i) {
-            Place::Before(_) => 0,
-            Place::Sample(k) => k,
+            ShownState::Before(_) => 0,
+            ShownState::Sample(k) => k,
         }
     }
 
@@ -256,8 +256,8 @@ impl<'k> Order<'k> {
         if let Some(rows) = &self.by_time {
             return match (rows[i].late, rows[i].place) {
                 (Some(late), _) => (late.output == j).then_some(late.sample),
-                (None, Place::Sample(k)) => (!self.is_late(j)).then_some(k),
-                (None, Place::Before(_)) => None,
+                (None, ShownState::Sample(k)) => (!self.is_late(j)).then_some(k),
+                (None, ShownState::Before(_)) => None,
             };
         }
         let late = self.dead_time.get(j).copied().unwrap_or(0);

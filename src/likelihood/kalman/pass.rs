@@ -6,7 +6,7 @@ use super::gaussian::{Belief, Columns, Root, regular};
 use super::moments::{Moment, Moments};
 use super::normal::clip::clip;
 use super::number::FilterNumber;
-use super::order::{Order, Place};
+use super::order::{Order, ShownState};
 use super::size::{Any, Buffer, Size};
 use super::update::{MeasuredRow, Readings, Update};
 use super::{FilterError, Kalman};
@@ -208,8 +208,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
             self.measure(i, &mut state, &mut root, sink)?;
             if i + 1 < self.order.rows() && self.order.is_last(i) {
                 match self.order.place(i) {
-                    Place::Sample(k) => self.go_on(k, &mut state, &mut root, sink),
-                    Place::Before(step) => self.go_to_row(step, i + 1, &mut state),
+                    ShownState::Sample(k) => self.go_on(k, &mut state, &mut root, sink),
+                    ShownState::Before(step) => self.go_to_row(step, i + 1, &mut state),
                 }
             }
         }
@@ -249,8 +249,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
     #[inline(always)]
     fn go_to_row(&self, step: usize, i: usize, state: &mut FilterState<S, N>) {
         let end = match self.order.place(i) {
-            Place::Before(step) => step,
-            Place::Sample(_) => self.jobs[0].acting.steps_before(),
+            ShownState::Before(step) => step,
+            ShownState::Sample(_) => self.jobs[0].acting.steps_before(),
         };
         if step == end {
             return;
@@ -309,8 +309,8 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
         let (n, p) = (self.size.states(), self.size.outputs());
         let place = self.order.place(i);
         match place {
-            Place::Sample(k) => self.go_to(k, state),
-            Place::Before(step) => self.go_before(step, state),
+            ShownState::Sample(k) => self.go_to(k, state),
+            ShownState::Before(step) => self.go_before(step, state),
         }
         if let Some(time) = self.order.read_after(i) {
             self.now.each(|_, now| now.read_after = Some(time));
@@ -354,7 +354,7 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 row: i,
             },
         );
-        if let Place::Sample(k) = place
+        if let ShownState::Sample(k) = place
             && self.order.is_last(i)
         {
             sink.filtered(k, state.belief(n));

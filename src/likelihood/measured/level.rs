@@ -83,6 +83,13 @@ pub(crate) struct StartElsewhere {
     pub is_held: bool,
 }
 
+impl StartElsewhere {
+    /// Returns whether a first row is explained, by its residual in deviations of the noise.
+    pub fn is_explained_at(residual: f64) -> bool {
+        residual.abs() <= MEASURED.elsewhere
+    }
+}
+
 /// Sizes of what a record shows, from which levels are guessed.
 pub(super) struct RecordSizes {
     /// Motion of each state.

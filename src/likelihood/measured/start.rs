@@ -17,15 +17,21 @@ use crate::twin::{Acting, Composed, Now, Role, is_memory};
 const SECOND_DIFFERENCE: f64 = 1.652;
 
 /// The better of two results where records contradict a start that the twin's code says: the one with that start given up, or the one of `again`
-/// with it held; and whether it is held. What is missing may bend the reading of a start, as an offset does.
+/// with it held; and whether it is held. What is missing may bend the reading of a start, as an offset does. Where
+/// effects of the twin itself may, as `bends` says, the odds are the other way round.
 pub(crate) fn with_better_start<R, E>(
-    given_up: R,
+    (given_up, bends): (R, bool),
     nats: impl Fn(&R) -> Option<f64>,
     again: impl FnOnce() -> Result<R, E>,
 ) -> Result<(R, bool), E> {
     let held = again()?;
-    let stands = (nats(&held).zip(nats(&given_up)))
-        .is_some_and(|(held, other)| held - other > MEASURED.stands);
+    let least = if bends {
+        -MEASURED.stands
+    } else {
+        MEASURED.stands
+    };
+    let stands =
+        (nats(&held).zip(nats(&given_up))).is_some_and(|(held, other)| held - other > least);
     Ok((if stands { held } else { given_up }, stands))
 }
 

@@ -227,22 +227,26 @@ impl Setting<'_> {
     fn finite(&self) -> Outcome {
         let corners = self.corners();
         let mut bad = corners.iter().filter_map(|theta| {
-            let problem = match self.run(theta) {
+            let (problem, is_redrawn) = match self.run(theta) {
                 Ok(outputs) if outputs.iter().all(|v| v.is_finite()) => return None,
-                Ok(_) => "outputs are not finite".to_owned(),
-                Err(error) => error.to_string(),
+                Ok(_) => ("outputs are not finite".to_owned(), true),
+                Err(error) => (error.to_string(), error.costs_one_run()),
             };
-            Some((theta, problem))
+            Some((theta, problem, is_redrawn))
         });
-        let Some((theta, problem)) = bad.next() else {
+        let Some((theta, problem, is_redrawn)) = bad.next() else {
             return Ok(format!(
                 "finite at the {} corners of the prior",
                 corners.len()
             ));
         };
         let (lost, all) = (bad.count() + 1, corners.len());
+        let then = match is_redrawn {
+            true => "such draws are redrawn: shrink the prior or the step",
+            false => "this ends all work: mend the simulator",
+        };
         let message = format!(
-            "{problem} at the prior's corner {} ({lost} of {all} corners); such draws are redrawn: shrink the prior or the step",
+            "{problem} at the prior's corner {} ({lost} of {all} corners); {then}",
             self.written(theta)
         );
         let severity = match lost == all {
@@ -302,10 +306,18 @@ impl Setting<'_> {
             Ok(jacobian) => jacobian,
             Err(error) => return warned(format!("not known: {error}")),
         };
+        // Columns of parameters that move nothing would leave the singular vectors of zeros to chance.
+        let sizes: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+        let least = FLAT * sizes.iter().copied().fold(0.0, f64::max);
+        let (moving, still): (Vec<usize>, Vec<usize>) =
+            (0..sizes.len()).partition(|&j| sizes[j] > least || sizes[j].is_nan());
+        let (names, jacobian) = (self.space.names(), jacobian.select_columns(&moving));
+        let name = |j: &usize| names[*j];
+        let moving: Vec<&str> = moving.iter().map(name).collect();
         let Some(svd) = thin_svd(&jacobian) else {
             return warned(TOO_LARGE);
         };
-        let largest = svd.values.max();
+        let largest = svd.values.iter().copied().fold(0.0, f64::max);
         if largest == 0.0 {
             return warned(
                 "the free run is the same for every θ: only noise can tell; take longer records or another input",
@@ -317,11 +329,12 @@ impl Setting<'_> {
             let chosen = (svd.values.iter().enumerate()).filter(|(_, s)| weak(**s));
             let words = chosen.map(|(i, _)| {
                 let direction = svd.right.column(i).into_owned();
-                combination(&self.space.names(), direction.as_slice())
+                combination(&moving, direction.as_slice())
             });
             words.collect()
         };
-        let flat = named(&|s| s <= FLAT * largest);
+        let still = still.iter().map(|j| name(j).to_owned());
+        let flat: Vec<String> = still.chain(named(&|s| s <= FLAT * largest)).collect();
         let drowned = named(&|s| s > FLAT * largest && deviation(s) > PRIOR_DEVIATION);
         if !flat.is_empty() {
             return warned(format!(
