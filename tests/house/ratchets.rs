@@ -280,7 +280,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 164, items.collect()),
         Ratchet::new("error types", 14, errors),
-        Ratchet::new("lines of code", 67_587, lines),
+        Ratchet::new("lines of code", 67_899, lines),
         Ratchet::new("files", 515, files.collect()),
         Ratchet::new("hidden items", 2, hidden(sources)),
         Ratchet::new("methods of StateSpace", 15, methods_of_state_space(sources)),
