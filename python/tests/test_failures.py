@@ -421,3 +421,8 @@ def test_a_simulator_that_follows_nothing_is_no_all_clear(tmp_path):
     loud = {**record, "y": record["y"] + 0.1 * np.random.default_rng(1).standard_normal(60)}
     told = [any("the simulator's own noise" in warning for warning in twin.estimate(given, estimator).warnings) for given in (record, loud)]
     assert told == [False, True]
+    louder = truetwin.Twin(decay, parameters={"rate": (0.1, 2.0)}, outputs="y", step=0.1, samples=60, noise=0.5)
+    with pytest.raises(truetwin.TruetwinError, match="made for another setting of the twin; give the twin that it was trained with"):
+        louder.estimate(record, estimator)
+    gap = {**record, "t": record["t"] + 0.3 * (np.arange(60) >= 9)}
+    assert any("row 9 (counted from 0)" in finding.message for finding in twin.check(gap).findings)

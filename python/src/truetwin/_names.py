@@ -14,7 +14,7 @@ from typing import Any
 from ._numbers import one_line, shown
 
 #: Rows of a file in a finding, which shows the first of many.
-_ROWS = re.compile(r"(?P<before>\bin rows )(?P<rows>\d+(?:, \d+)*(?:, …)?)")
+_ROWS = re.compile(r"(?P<before>\bin rows |: row )(?P<rows>\d+(?:, \d+)*(?:, …)?)")
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ _KEYS = {
     r" \((?:all of them in )?\[\w+\] of the study file\)": "",
     r"; \[record\] step of the study file": "; step of the twin",
     r"; \[record\] step = (\S+) in the twin file": r"; step=\1",
-    r"\bother study; name the study that it was trained with, or the twin alone": "another setting of the twin; give the twin that it was trained with",
+    r"\banother setting: other study; name .* or the twin alone": "another setting of the twin; give the twin that it was trained with",
     r", the study's (?=\S+ s;)": ", the twin's ",
     r"\[record\] substeps or integrator of the study file": "record={'substeps': n} or another integrator",
     r"\bthe study('s step| has no plan)": r"the twin\1",

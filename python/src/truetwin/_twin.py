@@ -380,7 +380,7 @@ class Twin:
         with _Call(self) as call:
             options = [call.record("record", record, columns), *call.columns(columns), "--estimator", word(estimator, "estimator")]
             # An estimator of other equations would answer, too.
-            options += call.subject(noise=True) if self._model is None else []
+            options += call.subject(noise=True)
             if validation is not None:
                 options += ["--validation", call.record("validation", validation, columns)]
             options += _flags(always_refine=always_refine, step_of_record=step_of_record)
