@@ -367,3 +367,44 @@ fn a_record_whose_steps_vary_is_named() {
         assert!(line.contains(part), "{line}");
     }
 }
+
+/// A start that the twin says stands beside a fitted gain of its sensor, which bends the first row as it does all others.
+#[test]
+fn a_start_stands_beside_a_fitted_gain() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let text = "[twin]\nname = \"tank\"\n[parameters]\nk = { prior = [0.2, 1.0] }\nc = { prior = [0.2, 1.0] }\n\
+                [states]\nh = { rate = \"k*u - c*h\", start = 2.0 }\n[inputs]\nu = {}\n\
+                [outputs]\ny = { value = \"h\", noise = 0.03 }\n[noise]\nprocess = \"none\"\n\
+                [record]\nstep = 0.4\nsamples = 150\ninput = { levels = [0.0, 2.0], hold = 12 }\n\
+                [[effect]]\nid = \"sensor-gain\"\ntarget = \"sensor\"\n";
+    write(at, "free.toml", text);
+    write(
+        at,
+        "held.toml",
+        &format!("{text}magnitudes = {{ error = 0.3 }}\n"),
+    );
+    write(at, "said.toml", &format!("{text}[start]\nh = 2.0\n"));
+    done(
+        at,
+        "simulate --study held.toml --theta k=0.5,c=0.4 --out r.csv",
+    );
+    for study in ["free", "said"] {
+        let fit = json(at, &format!("fit r.csv --study {study}.toml"));
+        let of = |name: &str| {
+            let all = fit["parameters"].as_array().unwrap();
+            all.iter().find(|p| p["name"] == name).unwrap()["interval"].clone()
+        };
+        for (name, truth) in [("k", 0.5), ("c", 0.4), ("sensor-gain@sensor.error", 0.3)] {
+            let interval = of(name);
+            let [low, high] = [0, 1].map(|i| interval[i].as_f64().unwrap());
+            assert!(low < truth && truth < high, "{study}: {name} {interval}");
+            assert!(high - low < 0.1, "{study}: {name} {interval}");
+        }
+        let codes = fit["warnings"].as_array().unwrap();
+        assert!(
+            codes.iter().all(|w| w["code"] != "start-elsewhere"),
+            "{codes:?}"
+        );
+    }
+}
