@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 
 /// Two seconds are documented; the rest is for a loaded machine.
 const HEARD: Duration = Duration::from_secs(2 + 2);
+/// Time within which a program has begun to listen: before, a signal ends it as it ends any program.
+const BEGUN: Duration = Duration::from_millis(20);
 /// Time within which a call that is done ends.
 const JUST_ENDED: Duration = Duration::from_millis(20);
 
@@ -169,7 +171,7 @@ fn heard(seed: u64, times: usize, copies: usize, within: Duration, wanted: impl 
         let mut rest = times;
         for _ in 0..4 * times {
             let before = names(at);
-            let after = whole.mul_f64(random.gen_range(0.02..0.95));
+            let after = whole.mul_f64(random.gen_range(0.02..0.95)).max(BEGUN);
             let signal = ["-INT", "-TERM"].choose(&mut random).unwrap();
             if let Some((took, end)) = stopped(at, call, signal, after) {
                 longest = longest.max(took);
