@@ -164,15 +164,17 @@ impl Report<'_> {
             let base = &self.found.evidence.base;
             let run = |record: &Record| base.model.base.free_run(&base.theta, record.drive());
             let outputs = &twin.signals().outputs;
+            let remedy =
+                "noise may hide what is missing: take a longer record, or a quieter sensor";
             let told = records.iter().filter_map(|record| {
                 Some(Warning::no_better_of(outputs, record, &run(record).ok()?))
             });
-            let noise = "noise may hide what is missing: take a longer record, or a quieter sensor";
-            all.extend(told.flatten().map(|doubt| Warning {
-                remedy: noise,
-                ..doubt
-            }));
-            all.dedup();
+            for doubt in told.flatten().map(|doubt| Warning { remedy, ..doubt }) {
+                // Once of each output, whatever records show it.
+                if !all.contains(&doubt) {
+                    all.push(doubt);
+                }
+            }
         }
         all
     }

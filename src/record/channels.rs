@@ -79,6 +79,11 @@ pub(super) fn columns(inputs: usize, outputs: usize) -> Vec<String> {
     [time, column_names("u", inputs), column_names("y", outputs)].concat()
 }
 
+/// Returns whether a reader finds a name in a header as it was written: without blanks at its ends, in one line.
+pub(super) fn is_cell(name: &str) -> bool {
+    name.trim() == name && !name.contains(['\r', '\n'])
+}
+
 /// Columns of a file that the reader of a twin's records takes for its inputs, and its outputs if `outputs`: those with the usual names,
 /// unless one of them is another channel's own name. Then each channel has its own name, or `u01`, `y002` where that tells it not apart.
 pub(super) fn header(signals: &Signals, outputs: bool) -> Vec<String> {
@@ -86,7 +91,7 @@ pub(super) fn header(signals: &Signals, outputs: bool) -> Vec<String> {
     let usual = columns(signals.inputs.len(), shown);
     let is_read = |column: &str, name: &str| {
         let found = usual_name(column, Some(signals));
-        found.as_deref() == Some(name) && column.trim() == column && !column.contains(['\r', '\n'])
+        found.as_deref() == Some(name) && is_cell(column)
     };
     if usual.iter().all(|name| is_read(name, name)) {
         return usual;

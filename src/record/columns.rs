@@ -52,18 +52,17 @@ impl Columns {
         keys.try_for_each(|key| channel_of(key, Some(signals)).map(drop))?;
         let header = self.header(signals);
         let cells: Vec<&str> = header.iter().map(String::as_str).collect();
-        let twice = |at: usize| cells[..at].contains(&cells[at]) || cells[at].is_empty();
-        let read = match (0..cells.len()).any(twice) {
-            true => vec![],
-            false => (self.usual_names(&cells, Some(signals)))
-                .map_err(|problem| format!("columns: {problem}"))?,
+        let is_repeated = |at: &usize| cells[*at].is_empty() || cells[..*at].contains(&cells[*at]);
+        let odd = match (0..cells.len()).find(is_repeated) {
+            Some(at) => Some(at),
+            None => {
+                let read = self.usual_names(&cells, Some(signals));
+                let read = read.map_err(|problem| format!("columns: {problem}"))?;
+                let usual = channels::columns(signals.inputs.len(), signals.outputs.len());
+                (read.iter().zip(&usual)).position(|(read, usual)| read.as_ref() != Some(usual))
+            }
         };
-        let usual = channels::columns(signals.inputs.len(), signals.outputs.len());
-        let is_read = |at: usize| {
-            read.get(at)
-                .is_some_and(|name| name.as_ref() == usual.get(at))
-        };
-        match (0..cells.len()).find(|&at| twice(at) || !(read.is_empty() || is_read(at))) {
+        match odd {
             None => Ok(()),
             Some(at) => Err(format!(
                 "columns: \"{}\" is no column, or that of two channels; give each channel a column of its own",
@@ -80,9 +79,6 @@ impl Columns {
             found.map(|(_, column)| column.clone())
         };
         let usual = channels::columns(signals.inputs.len(), signals.outputs.len());
-        let is_read = |name: &String| {
-            self.is_by_name(name, Some(signals)) && !self.0.values().any(|column| column == name)
-        };
         let outputs = usual.len() - signals.outputs.len();
         (usual
             .iter()
@@ -90,8 +86,8 @@ impl Columns {
             .enumerate())
         .map(|(at, (usual, header))| {
             let own = at.checked_sub(outputs).map(|j| &signals.outputs[j].name);
-            let own = own.filter(|own| is_read(own)).cloned();
-            given(usual).or(own).unwrap_or(header)
+            let own = own.filter(|own| self.is_by_name(own, Some(signals)));
+            given(usual).or(own.cloned()).unwrap_or(header)
         })
         .collect()
     }
@@ -105,9 +101,8 @@ impl Columns {
         let given: Vec<String> = keys
             .filter_map(|key| usual_name(key, Some(signals)))
             .collect();
-        // As cells of a header are.
-        let is_cell = column.trim() == column && !column.contains(['\r', '\n']);
-        is_cell
+        channels::is_cell(column)
+            && self.0.values().all(|other| other != column)
             && signals.outputs.iter().any(|output| output.name == column)
             && given.iter().any(|given| given.starts_with('y'))
             && !given.contains(&usual)

@@ -53,6 +53,7 @@ _OPTIONS = {
     r" \(--columns t=NAME.*? takes other names\)": " (columns={name: column} takes other names)",
     r" \(--timeout SECONDS allows more\)": " (timeout=seconds allows more)",
     r"flush each answer, or allow more time for one": "allow more time for one",
+    r" \(`truetwin resample R\.csv --step S --out R2\.csv` closes short gaps.*?\)": " (`truetwin resample` closes short gaps of a file)",
     r" \(`truetwin resample R\.csv --step S --out R2\.csv`(.*?)\)": r" (`truetwin resample` does it for a file\1)",
     r"leave the cell of an output empty if it was not measured": "give nan in an output that was not measured",
     r" \(`truetwin resample R\.csv --step \S+ --out R2\.csv`.*?\)": " (`truetwin resample` does it for a file)",

@@ -14,7 +14,7 @@ from . import _process, _records
 from ._equations import Entry, Expression, Text, is_expression
 from ._errors import TruetwinError
 from ._names import Names, word
-from ._numbers import Array, count, flag, mapping, named, number, one_line, shown, whole
+from ._numbers import Array, count, flag, named, number, one_line, shown, whole
 from ._points import Equation, PointModel, States
 from ._records import Record, Records
 from ._report import Report
@@ -129,7 +129,7 @@ class Twin:
     ) -> None:
         parameters = named("parameters", parameters, "name: (low, high)")
         constants, define = named("constants", constants, "name: number"), named("define", define, "name: expression")
-        record = mapping("record", record, "keys")
+        record = named("record", record, "keys")
         inputs = () if inputs is None else inputs
         events = () if events is None else events
         if isinstance(events, (Mapping, str)) or not isinstance(events, Sequence):
@@ -170,8 +170,8 @@ class Twin:
                 files = [of for of, own in plan["input"].items() if isinstance(own, str)]
                 if files and (drift or observe):
                     raise ValueError(f"levels: {files[0]} is a file, which equations as texts take; give (low, high) or a number")
-            plan |= named("record", record, "keys")
-            levels_of_noise = _noise_levels(noise, outputs, _names_of(states), expressions=True)
+            plan |= record
+            levels_of_noise = _noise_levels(noise, outputs, list(states), expressions=True)
             moving, shown = _noisy(states, levels_of_noise, "rate", drift), _noisy(outputs, levels_of_noise, "value", observe)
             if drift or observe:
                 if events:
@@ -632,13 +632,9 @@ def _texts(what: str, value: Any) -> list[str]:
     return list(texts)
 
 
-def _names_of(entries: States) -> list[str]:
-    return list(entries if isinstance(entries, Mapping) else listed("states or outputs", entries))
-
-
 def _noise_levels(noise: float | Mapping[str, Any] | None, outputs: States, states: Sequence[str] = (), expressions: bool = False) -> dict[str, Any]:
     """Return the noise of the call by output: a number is that of each. By name, states may have one, too, and one may be an expression."""
-    names = _names_of(outputs)
+    names = list(outputs)
     levels = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(names, noise)
     if unknown := set(levels) - {*names, *states}:
         raise ValueError(f"noise of {', '.join(sorted(map(str, unknown)))}; the outputs are {', '.join(names)}")
@@ -651,7 +647,7 @@ def _noisy(entries: States, levels: Mapping[str, Any], key: str, function: Equat
     # What a function computes has a unit in place of an expression.
     key = "unit" if function else key
     noisy: dict[str, Entry] = {}
-    for name, entry in (entries if isinstance(entries, Mapping) else dict.fromkeys(_names_of(entries), {})).items():
+    for name, entry in (entries if isinstance(entries, Mapping) else dict.fromkeys(entries, {})).items():
         level = levels.get(name)
         if level is not None and isinstance(entry, Mapping) and "noise" in entry:
             raise ValueError(f"noise of {name} is given twice, here and in its entry; give one")

@@ -101,6 +101,10 @@ impl<'k> Order<'k> {
     fn by_time(kalman: &'k Kalman<'_>, delays: &[f64]) -> Self {
         let drive = kalman.record.drive();
         let (times, ahead) = (drive.times(), seconds_before(&kalman.twin, drive));
+        // All that a row may show, in order of time.
+        let steps = (ahead.iter().enumerate()).map(|(i, ahead)| (-ahead, ShownState::Before(i)));
+        let samples = (times.iter().enumerate()).map(|(k, time)| (*time, ShownState::Sample(k)));
+        let places: Vec<(f64, ShownState)> = steps.chain(samples).collect();
         let (mut rows, mut dead_time) = (vec![], vec![0; kalman.channels]);
         for (sample, time) in times.iter().enumerate() {
             rows.push(TimedRow {
@@ -108,19 +112,12 @@ impl<'k> Order<'k> {
                 late: None,
             });
             for (output, delay) in delays.iter().enumerate().filter(|(_, d)| **d > 0.0) {
-                let shown = times.partition_point(|t| *t < time - delay);
+                let at = places.partition_point(|(t, _)| *t < time - delay);
+                let shown = at.saturating_sub(ahead.len());
                 dead_time[output] = dead_time[output].max(sample - shown).max(1);
-                let step = ahead.partition_point(|ahead| *ahead > delay - time);
-                let (place, after) = match (shown, step) {
-                    (1.., _) => (ShownState::Sample(shown), time - times[shown]),
-                    // Before the start, its value stands.
-                    (0, 0) if ahead.is_empty() => (ShownState::Sample(0), f64::INFINITY),
-                    (0, 0) => (ShownState::Before(0), f64::INFINITY),
-                    (0, step) => match ahead.get(step) {
-                        Some(ahead) => (ShownState::Before(step), time + ahead),
-                        None => (ShownState::Sample(0), *time),
-                    },
-                };
+                let (seen, place) = places[at];
+                // Before the first of them, its value stands.
+                let after = if at == 0 { f64::INFINITY } else { time - seen };
                 let late = LateReading {
                     output,
                     sample,
@@ -254,10 +251,9 @@ impl<'k> Order<'k> {
     /// Sample at which the record has output j of row i, perhaps behind its end; `None` where the row before the first has none.
     pub fn sample_of(&self, i: usize, j: usize) -> Option<usize> {
         if let Some(rows) = &self.by_time {
-            return match (rows[i].late, rows[i].place) {
-                (Some(late), _) => (late.output == j).then_some(late.sample),
-                (None, ShownState::Sample(k)) => (!self.is_late(j)).then_some(k),
-                (None, ShownState::Before(_)) => None,
+            return match rows[i].late {
+                Some(late) => (late.output == j).then_some(late.sample),
+                None => (!self.is_late(j)).then(|| self.state_of(i)),
             };
         }
         let late = self.dead_time.get(j).copied().unwrap_or(0);

@@ -239,10 +239,12 @@ impl<'k, S: Size, N: FilterNumber> Pass<'k, S, N> {
                 *to.lane_mut(lane) = *value;
             }
         }
-        let mut state = FilterState::zero(n);
-        state.set(self.state.belief(n));
-        self.go_to_row(0, 0, &mut state);
-        self.state.set(state.belief(n));
+        if self.jobs[0].acting.steps_before() > 0 {
+            let mut state = FilterState::zero(n);
+            state.set(self.state.belief(n));
+            self.go_to_row(0, 0, &mut state);
+            self.state.set(state.belief(n));
+        }
     }
 
     /// Carries the state from the start of this step before the first row to row i. Filters side by side have as many such steps.

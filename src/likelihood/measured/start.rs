@@ -48,12 +48,8 @@ impl Starts {
         let names: Vec<String> = (twin.outline().states.into_iter())
             .map(|state| state.name)
             .collect();
-        let space = twin.outline().parameters;
-        let theta: Vec<f64> = (space.iter().zip(theta))
-            .map(|(p, value)| p.bounds.clamp(*beliefs.off.get(&p.name).unwrap_or(value)))
-            .collect();
         let drive = records[0].drive();
-        let now = Now::new(drive.first_time(), drive.dt(), drive.input(0), &theta);
+        let now = Now::new(drive.first_time(), drive.dt(), drive.input(0), theta);
         let written = twin.written_starts(&now);
         let is_declared = |name: &String| beliefs.starts.contains(name);
         let mut unknown: Vec<bool> = (names.iter().zip(&written))
@@ -66,7 +62,7 @@ impl Starts {
         for (r, record) in (records.iter().enumerate()).filter(|_| !beliefs.trusts_code) {
             // Of records that begin at 0, the study's own word stands; at another time, it may be that of a start before the record.
             let stands = record.drive().first_time() == 0.0 || twin.begins().is_some();
-            let Some(found) = contradiction((twin, &unknown), &[], record, &theta) else {
+            let Some(found) = contradiction((twin, &unknown), &[], record, theta) else {
                 continue;
             };
             let (held, given_up): (Vec<usize>, Vec<usize>) = (0..names.len())

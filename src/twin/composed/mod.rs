@@ -201,11 +201,17 @@ impl Composed {
 
     /// Returns the names of events whose times all lie outside these records, with the start of the twin.
     pub(crate) fn events_outside(&self, theta: &[f64], records: &[Record]) -> Vec<&str> {
+        if !self.has_events() {
+            return vec![];
+        }
         let spans = records.iter().filter_map(|record| {
             let acting = Acting::of(self, theta, record.drive()).ok()?;
             Some((acting, record.drive().own_time(record.samples() - 1)))
         });
         let spans: Vec<_> = spans.collect();
+        if spans.is_empty() {
+            return vec![];
+        }
         let is_outside = |event: &&Event| {
             spans.iter().all(|(acting, end)| {
                 let start = acting.start();
@@ -214,7 +220,6 @@ impl Composed {
             })
         };
         let events = self.parts.outline.events.iter();
-        let events = events.filter(|_| !spans.is_empty());
         events.filter(is_outside).map(Event::name).collect()
     }
 
